@@ -7,16 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isclose
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
 from tbcad.cad.formats.checked_files import Row, write_table
-from tbcad.cad.formats.step import StepError, read_named_solid
+from tbcad.cad.formats.step import read_named_solid
 from tbcad.cad.formats.step_tolerances import (
+    FaceTolerance,
     FaceTolerances,
-    ReadTolerance,
-    read_tolerances,
+    check_read_back,
     write_tolerances,
 )
 from tbcad.cad.kernel.brep import Solid
@@ -24,7 +23,6 @@ from tbcad.cad.kernel.solids import cylinder_radius
 from tbcad.core.mirrors.array import mirror_ids
 from tbcad.core.optics.cells import Cells
 from tbcad.core.optics.pedestals.cells import PedestalCells
-from tbcad.core.optics.power_diagram import PLANES
 from tbcad.core.optics.reflection import roughness_nm
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
@@ -46,10 +44,6 @@ COLUMNS = (
     *("offset_chain_um", "tilt_chain_mrad", "radius_chain_mm"),  # two standard deviations
 )
 WALL_COLUMNS = ("wall_limit_um", "wall_sigma_um", "wall_chain_um")  # of mirrors on pedestals
-Key = TypeVar("Key", str, int, frozenset[str])
-SAME = 1e-9  # mm: numbers in a file have 15 digits
-SAME_PLANE = 1e-6  # of normal and distance (mm): at n = 18 no two walls are closer than 2e-4
-EITHER_WAY = np.array([1.0, -1.0])
 
 
 @dataclass(frozen=True)
@@ -62,9 +56,7 @@ class Half:
     limits: MirrorLimits
     chain: Floats  # two standard deviations of what the chain makes, (m, kinds)
     dowel_mm: float  # diameter of the holes for dowel pins
-    # of each mirror's pedestal: names of the faces, with a point (mm) and the normal of their
-    # planes, (6,); none where spheres meet
-    walls: tuple[dict[str, Floats], ...]
+    walls: tuple[tuple[str, ...], ...]  # faces of each mirror's pedestal; none where spheres meet
 
     @property
     def profile_mm(self) -> Floats:
@@ -129,21 +121,14 @@ def halves(export: ExportedDesign, limits: MirrorLimits, chain: Floats) -> tuple
     return a, b
 
 
-def _walls(ids: tuple[str, ...], cells: Cells) -> tuple[dict[str, Floats], ...]:
-    """Walls of each mirror's pedestal, as `Half` has them; none where spheres meet."""
+def _walls(ids: tuple[str, ...], cells: Cells) -> tuple[tuple[str, ...], ...]:
+    """Walls of each mirror's pedestal, as `Half` has them."""
     if not isinstance(cells, PedestalCells):
         return ()
-    planes = cells.surfaces.subset(slice(cells.mirrors + PLANES, None))
-    poses = zip(
-        cells.walls[:, 0].tolist(),
-        wall_names(ids, cells),
-        np.hstack([planes.apex, planes.normal]),
-        strict=True,
-    )
-    walls: tuple[dict[str, Floats], ...] = tuple({} for _ in ids)
-    for mirror, name, plane in poses:
-        walls[mirror][name] = plane
-    return walls
+    walls: tuple[list[str], ...] = tuple([] for _ in ids)
+    for mirror, name in zip(cells.walls[:, 0].tolist(), wall_names(ids, cells), strict=True):
+        walls[mirror].append(name)
+    return tuple(map(tuple, walls))
 
 
 def write_table_of(folder: Path, half: Half) -> str:
@@ -166,21 +151,29 @@ def write_solid(folder: Path, export: Path, half: Half, chain: Mapping[str, str]
         raise InputError(f"{export / half.name}.step has no face {missing[0]}: run tbcad build")
     given = tolerances(half, dowel_face(solid, half.dowel_mm))
     write_tolerances(folder / step, solid, replace(given, notes={**given.notes, **chain}))
-    check_read_back(folder / step, given, half)
+    check_read_back(folder / step, given)
     return step
 
 
 def tolerances(half: Half, dowel: str) -> FaceTolerances:
     """What the faces of a half may be off."""
     seat = half.limits.seat_um * MM_PER_UM
-    radius = zip(half.surfaces.radius.tolist(), half.limits.each[:, 2].tolist(), strict=True)
+    radii = zip(
+        half.ids, half.limits.each[:, 2].tolist(), half.surfaces.radius.tolist(), strict=True
+    )
+    profiles = zip(half.ids, half.profile_mm.tolist(), strict=True)
     return FaceTolerances(
         datums=DATUM_FACES | {"C": dowel},
-        flatness=dict.fromkeys(DATUM_FACES.values(), seat),
-        profile=dict(zip(half.ids, half.profile_mm.tolist(), strict=True)),
-        radius=dict(zip(half.ids, radius, strict=True)),
+        each=(
+            *(FaceTolerance("flatness", (face,), seat) for face in DATUM_FACES.values()),
+            *(FaceTolerance("profile", (name,), width) for name, width in profiles),
+            *(
+                FaceTolerance("profile", names, width)
+                for names, width in zip(half.walls, half.wall_profile_mm, strict=True)
+            ),
+            *(FaceTolerance("radius", (name,), limit, radius) for name, limit, radius in radii),
+        ),
         notes=notes(half.wall_um),
-        common_profile=dict(zip(map(tuple, half.walls), half.wall_profile_mm, strict=True)),
     )
 
 
@@ -206,71 +199,3 @@ def notes(wall_um: Floats | None = None) -> dict[str, str]:
         "limits": "of mirrors: as reflecting, coated; each zone by its own mirror",
         "datums": "A foot plane, B seam plane, C dowel hole",
     }
-
-
-def check_read_back(path: Path, given: FaceTolerances, half: Half) -> None:
-    """Compare all zones and radii in a file with what they should be, by the faces of a half.
-
-    StepError if one is missing, doubled, or not as given: a fault of tbcad.
-    """
-    read, centres = read_tolerances(path), dict(zip(half.ids, half.surfaces.centre, strict=True))
-    walls = {name: plane for of_mirror in half.walls for name, plane in of_mirror.items()}
-    flat = sorted(one.value for one in read if one.kind == "flatness")
-    written = sorted(given.flatness.values())
-    _same(path, "flatness", dict(enumerate(flat)), dict(enumerate(written)))
-    zones = [one for one in read if one.kind == "profile"]
-    if any(one.datums != tuple(given.datums) for one in zones):
-        raise StepError(f"{path.name}: a zone is not in the frame of the datums")
-    of_walls = [one for one in zones if one.planes]
-    of_mirrors = [one for one in zones if not one.planes]
-    _same(path, "zones", _by_mirror(of_mirrors, centres), given.profile)
-    common = {frozenset(names): width for names, width in given.common_profile.items()}
-    _same(path, "zones of walls", _by_walls(of_walls, walls), common)
-    radii = [one for one in read if one.kind == "radius"]
-    limits = {name: limit for name, (_, limit) in given.radius.items()}
-    nominal = {name: radius for name, (radius, _) in given.radius.items()}
-    _same(path, "limits of radii", _by_mirror(radii, centres), limits)
-    _same(path, "radii", _by_mirror(radii, centres, "nominal"), nominal)
-
-
-def _by_mirror(
-    read: list[ReadTolerance], centres: Mapping[str, Floats], which: str = "value"
-) -> dict[str, float]:
-    """Values by the mirror on whose sphere each face is."""
-    names, known = list(centres), np.array(list(centres.values()))
-    values = {}
-    for one in read:
-        if one.centre is None:
-            raise StepError("a tolerance of a mirror is not on a sphere")
-        distance = np.linalg.norm(known - one.centre, axis=1)
-        values[names[int(distance.argmin())]] = float(getattr(one, which))
-    return values
-
-
-def _by_walls(
-    read: list[ReadTolerance], walls: Mapping[str, Floats]
-) -> dict[frozenset[str], float]:
-    """Values by the names of the walls whose planes the faces are on."""
-    names, known = list(walls), _plane_numbers(np.array(list(walls.values())).reshape(-1, 2, 3))
-    values = {}
-    for one in read:
-        planes = _plane_numbers(np.array(one.planes))
-        either = EITHER_WAY[:, None, None] * planes[:, None, None]
-        distance = np.linalg.norm(either - known, axis=3).min(axis=1)
-        if distance.min(axis=1).max() > SAME_PLANE:
-            raise StepError("a zone is on no wall of a pedestal")
-        values[frozenset(names[k] for k in distance.argmin(axis=1))] = one.value
-    return values
-
-
-def _plane_numbers(planes: Floats) -> Floats:
-    """Normals and distances from the origin (mm) of planes by points and normals, (w, 4)."""
-    point, normal = planes[:, 0], planes[:, 1]
-    return np.column_stack([normal, (point * normal).sum(axis=1)])
-
-
-def _same(path: Path, what: str, read: Mapping[Key, float], given: Mapping[Key, float]) -> None:
-    if read.keys() != given.keys():
-        raise StepError(f"{path.name}: {len(read)} {what} are read, {len(given)} were written")
-    if any(abs(read[key] - given[key]) > SAME for key in read):
-        raise StepError(f"{path.name}: {what} are read otherwise than they were written")

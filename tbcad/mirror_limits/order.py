@@ -172,4 +172,4 @@ def minimum_at_limits(export: ExportedDesign, limits: MirrorLimits, builds: int 
             wall = generator.choice([-1.0, 1.0], shape) * each[:, 3]
         off = Deviation(sign[0] * each[:, 0], tilt, sign[1] * each[:, 2], wall)
         draws.append(off.draws(model))
-    return float(coverage(models, (draws[0], draws[1]), worst_only=True)[0].min())
+    return float(coverage(models, (draws[0], draws[1]), worst_only=True).min())

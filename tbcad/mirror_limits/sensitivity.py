@@ -169,7 +169,7 @@ def _coverage(models: EdgeModels, deviation: Deviation, half: int = 0) -> Floats
     builds, m = deviation.offset.shape
     none = Deviation.none(builds, m)
     draws = [(deviation if k == half else none).draws(model) for k, model in enumerate(models)]
-    return coverage(models, (draws[0], draws[1]))[0]
+    return coverage(models, (draws[0], draws[1]))
 
 
 def _worse(designed: Floats, coverages: Iterable[Floats]) -> Floats:
@@ -190,7 +190,7 @@ def _seat_losses(models: EdgeModels, half: int, designed: Floats) -> Floats:
         for rows in (step, -step):
             draws = [Deviation.none(len(rows), len(one)).draws(one) for one in models]
             draws[half] = replace(draws[half], **{field: rows})
-            both.append(coverage(models, (draws[0], draws[1]))[0])
+            both.append(coverage(models, (draws[0], draws[1])))
         total += np.sqrt((_worse(designed, both) ** 2).sum(axis=0)) / SEAT_STEP_UM
     return total
 

@@ -6,7 +6,6 @@ give the same figure.
 """
 
 import json
-import math
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -24,7 +23,7 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
 from tbcad.light.reconstruction.picture import BY_FIELD
 from tbcad.light.simulate.capture.light_field import traced_light_field
-from tbcad.light.simulate.capture.photograph import Sensor, count_pixels
+from tbcad.light.simulate.capture.photograph import virtual_camera_pixels
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
@@ -35,7 +34,7 @@ from tbcad.light.simulate.views.viewpoints import (
     viewpoints_around,
     views_by,
 )
-from tbcad.types import Bytes, Floats, Ints
+from tbcad.types import Bytes, Floats
 
 AZIMUTHS, DISTANCE_MM = 4, 640.0
 
@@ -175,28 +174,15 @@ def evaluate(
 def figures_of(designed: MirrorDesign) -> Figures:
     """Figures of a design, of both halves together."""
     array, camera = designed.arrays[0], designed.spec.camera
-    pixels, weight = virtual_camera_pixels(array, designed.spec)
-    mean = float(np.average(pixels, weights=weight))
-    variance = float(np.average((pixels - mean) ** 2, weights=weight))
+    pixels = virtual_camera_pixels(array, designed.spec.optics.capture_diameter_mm / 2)
     return Figures(
         minimum_px=float(pixels.min()),
-        median_px=float(np.median(np.repeat(pixels, weight))),
-        mean_log_px=float(np.average(np.log(np.maximum(pixels, 1)), weights=weight)),
-        variation=math.sqrt(variance) / mean,
+        median_px=float(np.median(pixels)),
+        mean_log_px=float(np.log(np.maximum(pixels, 1)).mean()),
+        variation=float(pixels.std() / pixels.mean()),
         size_mm=size_of(array),
         view_angle_deg=float(camera.hfov_deg),
     )
-
-
-def virtual_camera_pixels(array: MirrorArray, spec: Spec) -> tuple[Floats, Ints]:
-    """Pixels that show the capture sphere, (m,), and how many virtual cameras have as many, (m,).
-
-    The two halves of a mirror on the seam make one virtual camera, with the pixels of both.
-    """
-    sensor = Sensor(spec.camera.width_px, spec.camera.height_px)
-    counts = count_pixels(array, (sensor,), spec.optics.capture_diameter_mm / 2)[0]
-    halved = array.u[:, 0] == 0
-    return np.where(halved, 2, 1) * counts.seen, np.where(halved, 1, 2)
 
 
 def size_of(array: MirrorArray) -> float:

@@ -1,6 +1,7 @@
 """All files of both shells and of their negatives, from a design to a folder."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -12,19 +13,19 @@ from tbcad.cad.formats.mesh_files import write_3mf, write_stl
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Maker, Ring, Solid, hole_faces
 from tbcad.cad.kernel.checks import (
-    FaceIntegrals,
     SolidProperties,
     face_integrals,
     mean_corner,
     properties,
+    properties_within,
 )
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.solids import faces, one_solid, reversed_faces
 from tbcad.core.geometry.vectors import FLIP_X
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.core.mirrors.record import part_files
-from tbcad.core.optics.cells import CellMoments, Cells, cell_moments
-from tbcad.core.optics.pedestals.cells import PedestalCells, WallMoments, wall_moments
+from tbcad.core.optics.cells import Cells, cell_integrals
+from tbcad.core.optics.pedestals.cells import PedestalCells, wall_integrals
 from tbcad.records.design import MandrelRecord
 from tbcad.shell.envelope import Envelope, Holes, boundary_chain, chain_ends, closing_envelope
 from tbcad.shell.mandrel import Mandrel, mandrel_of
@@ -123,18 +124,14 @@ def shell_properties(
     if not (cells.mirror_surfaces.curvature > 0).all():
         return properties(solid.shape)
     origin = mean_corner(solid.shape)
-    moments: list[CellMoments | WallMoments] = [cell_moments(cells, origin)]
+    total = cell_integrals(cells, origin)
     if isinstance(cells, PedestalCells):
-        moments.append(wall_moments(cells, origin))
-    side = -1.0 if negative else 1.0  # of the material
-    first, *others = (
-        FaceIntegrals(origin, side * one.volume, side * one.volume_moment, float(one.area.sum()))
-        for one in moments
-    )
-    total = sum(others, first)
+        total += wall_integrals(cells, origin)
+    if negative:  # the material is on their other side
+        total = replace(total, volume=-total.volume, volume_moment=-total.volume_moment)
     for face in faces(solid.shape)[len(array) + len(wall_names(array.ids, cells)) :]:
         total += face_integrals(face, origin)
-    return total.properties
+    return properties_within(total)
 
 
 def camera_a_mesh(design: MirrorDesign, envelope: Envelope | None = None) -> Mesh:

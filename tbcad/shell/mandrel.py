@@ -32,7 +32,6 @@ X, _, Z = np.eye(3)
 DEPTH_DIAMETERS = 2.0  # of a blind hole: a thread in aluminium then holds as much as its screw
 INSET_STEP_MM = 1.0
 ROUND, ALONG = 24, 5  # places where the distance of a hole from the mirrors is looked at
-REMEDY_SHARES = (0.8, 0.6, 0.4, 0.2)  # of holes that do not fit, tried for a remedy
 
 
 @dataclass(frozen=True)
@@ -102,29 +101,28 @@ class Mandrel:
 
 
 def mandrel_of(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> Mandrel:
-    """Holes and draft of camera a's negative; SpecError, with what fits, if there is no room."""
-    holes = _inset_holes(shell, cells, ellipsoid)
-    if holes is None:
-        raise SpecError(_no_room(shell, cells, ellipsoid))
-    return Mandrel(_foot(cells), *holes, draft_of(cells))
-
-
-def _foot(cells: Cells) -> float:
-    return float(cells.surfaces.apex[cells.foot, 2])
+    """Holes and draft of camera a's negative; SpecError if there is no room for holes."""
+    foot = float(cells.surfaces.apex[cells.foot, 2])
+    seam_holes, foot_holes = (
+        _inset_holes(shell, cells, ellipsoid, foot, seam) for seam in (True, False)
+    )
+    return Mandrel(foot, seam_holes, foot_holes, draft_of(cells))
 
 
 def _inset_holes(
-    shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid
-) -> tuple[Holes, Holes] | None:
-    """Holes of seam and foot as near the mirrors as the wall allows; None where none fit."""
-    found = []
-    for seam in (True, False):
-        tried = _holes(shell, ellipsoid, _foot(cells), seam)
-        holes = next((one for one in tried if _clear(one, cells.mirror_surfaces, shell)), None)
-        if holes is None:
-            return None
-        found.append(holes)
-    return found[0], found[1]
+    shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid, foot: float, seam: bool
+) -> Holes:
+    """Holes of seam or foot as near the mirrors as the wall allows."""
+    for holes in _holes(shell, ellipsoid, foot, seam):
+        if _clear(holes, cells.mirror_surfaces, shell):
+            return holes
+    size = 2 * max(_radius(shell.seam_flange), _radius(shell.foot_flange))
+    raise SpecError(
+        f"the mandrel has no room for blind holes of {size:g} mm with shell.wall_mm "
+        f"{shell.wall_mm:g} round them: make bolt_hole_mm and dowel_hole_mm under "
+        "shell.seam_flange and shell.foot_flange or shell.wall_mm smaller, or set shell.negative "
+        "to false"
+    )
 
 
 def _holes(shell: ShellSpec, ellipsoid: Ellipsoid, foot: float, seam: bool) -> Iterator[Holes]:
@@ -167,35 +165,3 @@ def distances(mirrors: Surfaces, points: Floats) -> Floats:
     value = mirrors.value(every, points[:, None])
     root = np.sqrt(np.maximum(1 + 2 * mirrors.curvature * value, 0))
     return np.asarray((2 * value / (1 + root)).min(axis=1))
-
-
-def _no_room(shell: ShellSpec, cells: Cells, ellipsoid: Ellipsoid) -> str:
-    """Why there is no room, and the largest holes tried for which there is."""
-    asked = max(_radius(shell.seam_flange), _radius(shell.foot_flange)) * 2
-    reason = (
-        f"the mandrel has no room for blind holes of {asked:g} mm with shell.wall_mm "
-        f"{shell.wall_mm:g} round them"
-    )
-    for share in REMEDY_SHARES:
-        size = round(share * asked, 1)
-        if size >= 1 and _inset_holes(_with_holes(shell, size), cells, ellipsoid):
-            return (
-                f"{reason}: make bolt_hole_mm and dowel_hole_mm under shell.seam_flange and "
-                f"shell.foot_flange {size:g} or less, or set shell.negative to false"
-            )
-    return (
-        f"{reason}, nor for smaller ones: make shell.wall_mm smaller, "
-        "or set shell.negative to false"
-    )
-
-
-def _with_holes(shell: ShellSpec, size: float) -> ShellSpec:
-    """The shell with no hole larger than a size, mm."""
-
-    def smaller(flange: FlangeSpec) -> FlangeSpec:
-        keys = ("bolt_hole_mm", "dowel_hole_mm")
-        return flange.model_copy(update={key: min(size, getattr(flange, key)) for key in keys})
-
-    return shell.model_copy(
-        update={key: smaller(getattr(shell, key)) for key in ("seam_flange", "foot_flange")}
-    )

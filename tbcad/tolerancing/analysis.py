@@ -1,6 +1,6 @@
 """Effect of a manufacturing process on a design: yield, sensitivity, and the margin needed."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
@@ -17,10 +17,9 @@ from tbcad.tolerancing.montecarlo.builds import (
     AnyResult,
     Case,
     CoverageCase,
+    CoverageResult,
     MonteCarloCase,
-    ShellResult,
     SingleErrorEffect,
-    WorstCoverage,
     YieldEstimate,
     estimate_yield,
     one_at_a_time,
@@ -40,6 +39,7 @@ from tbcad.tolerancing.prototype.windows import (
 )
 from tbcad.types import Floats
 
+NOT_SEARCHED = Margin(None, 0.0, "not searched for: add --margins")
 SEARCH_BUILDS = 100  # in each step of a search; the process itself has as many as asked for
 PHOTOGRAPHED_BUILDS = 2  # builds whose pictures are simulated
 
@@ -50,7 +50,7 @@ class ProcessOption:
 
     name: str
     estimate: YieldEstimate  # yield with the design as it is
-    margin: Margin | None = None  # that it needs for the wanted yield; None: not searched for
+    margin: Margin = NOT_SEARCHED  # that it needs for the wanted yield
     builds: int = SEARCH_BUILDS
 
 
@@ -63,7 +63,7 @@ class Analysis:
     target: float  # minimum coverage of a good build, mm
     cameras: tuple[Reflector, Reflector]  # camera a and b as designed
     edge_models: EdgeModels  # the same for the fast model
-    result: ShellResult
+    result: CoverageResult
     single_errors: tuple[SingleErrorEffect, ...]  # each kind by itself, the largest loss first
     process_options: tuple[ProcessOption, ...]  # every built-in process, or this one alone
     margin: Margin | None  # that this process needs; None where it was not searched for
@@ -101,12 +101,20 @@ def analyse(
     options.progress("each kind of error by itself")
     # All searches share the builds without errors, and each begins with the builds of its loss.
     worst = cache(simulator.worst_coverage)
-    effects = sorted(simulator.single_errors(errors, worst), key=lambda one: -one.loss)
+    effects = []
+    for kind in shell_kinds(errors, len(simulator.edge_models[0].walls)):
+        options.detail(kind)
+        effects.append(one_at_a_time(errors, kind, options.wanted_yield, target, worst))
+    effects.sort(key=lambda one: -one.loss)
     estimate = estimate_yield(result.worst, target)
     compared = [ProcessOption(process.name, estimate, builds=options.builds)]
     if options.process is None:
         options.progress("every process")
-        compared = [*simulator.every_process(worst)]
+        compared = []
+        for name in BUILT_IN:
+            options.detail(name)
+            seen = worst(simulator.errors_of(load_process(name)))
+            compared.append(ProcessOption(name, estimate_yield(seen, target)))
     own = None
     if options.margins:
         options.progress("the margins needed")
@@ -163,20 +171,6 @@ class _Simulator:
         self, case: Any, batches: Sequence[range], report: Callable[[range], None] = lambda _: None
     ) -> list[Any]:
         return schedule.run_units(case, batches, self.options.scheduler, report)
-
-    def single_errors(self, errors: Errors, worst: WorstCoverage) -> Iterator[SingleErrorEffect]:
-        """What each kind of error costs by itself."""
-        wanted, target = self.options.wanted_yield, self.export.capture_mm
-        for kind in shell_kinds(errors, len(self.edge_models[0].walls)):
-            self.options.detail(kind)
-            yield one_at_a_time(errors, kind, wanted, target, worst)
-
-    def every_process(self, worst: WorstCoverage) -> Iterator[ProcessOption]:
-        """Every built-in process with its yield."""
-        for name in BUILT_IN:
-            self.options.detail(name)
-            seen = worst(self.errors_of(load_process(name)))
-            yield ProcessOption(name, estimate_yield(seen, self.export.capture_mm))
 
     def margin(self, designs: SolvedDesigns, process: Process) -> Margin:
         """The margin that a process needs."""

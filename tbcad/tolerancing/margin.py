@@ -15,10 +15,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tbcad.core.mirrors.array import DIRECTION_DIGITS, MirrorArray, design
+from tbcad.core.mirrors.array import DIRECTION_DIGITS, design
 from tbcad.core.spec.design import MAX_MARGIN, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
-from tbcad.light.simulate.capture.photograph import Sensor, count_pixels
+from tbcad.light.simulate.capture.photograph import virtual_camera_pixels
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.montecarlo.builds import coverage_at_yield
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
@@ -106,20 +106,8 @@ class SeeingPixels:
 def seeing_pixels(spec: Spec) -> SeeingPixels:
     """Count the pixels of a design by one ray through each."""
     radius = spec.optics.capture_diameter_mm / 2
-    pixels = pixels_of_cameras(design(spec).arrays[0], radius)
+    pixels = virtual_camera_pixels(design(spec).arrays[0], radius)
     return SeeingPixels(float(np.median(pixels)), float(pixels.min()))
-
-
-def pixels_of_cameras(array: MirrorArray, radius: float) -> Floats:
-    """Pixels that see a capture sphere, over the v virtual cameras of both halves, (v,).
-
-    The array is camera a's; both halves of a mirror on the seam count together.
-    """
-    camera = array.camera
-    sensor = Sensor(camera.width_px, camera.height_px)
-    seen = count_pixels(array, (sensor,), radius)[0].seen
-    halved = array.u[:, 0] == 0
-    return np.concatenate([np.where(halved, 2 * seen, seen), seen[~halved]])
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ import numpy as np
 
 from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.geometry.vectors import dot, norm, unit
-from tbcad.tolerancing.analysis import Analysis
-from tbcad.tolerancing.margin import Margin
+from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.tolerancing.analysis import NOT_SEARCHED, Analysis
 from tbcad.tolerancing.montecarlo.builds import (
     FACTOR_TOLERANCE,
     CoverageResult,
@@ -27,7 +27,6 @@ from tbcad.tolerancing.process.chain import MICROMETRE, ErrorSpec
 from tbcad.types import Floats
 
 SCHEMA = "tbcad-tolerance/2"
-NOT_SEARCHED = Margin(None, 0.0, "not searched for: add --margins")
 QUANTILES = (0.01, 0.05, 0.5)
 LOW_SHARE = 0.05  # share of the builds whose coverage lies below what table and map show
 NOTES = (
@@ -124,7 +123,7 @@ def _wanted(analysis: Analysis) -> str:
 
 def _margins_sentence(analysis: Analysis) -> str:
     options = analysis.process_options
-    margins = {one.name: (one.margin or NOT_SEARCHED).mm for one in options}
+    margins = {one.name: one.margin.mm for one in options}
     enough = [f"{name} with {mm:.2f} mm" for name, mm in margins.items() if mm is not None]
     none = [name for name, mm in margins.items() if mm is None]
     text = f"Margins needed for {_wanted(analysis)}: {', '.join(enough) or 'none found'}"
@@ -187,14 +186,23 @@ def spread_dict(analysis: Analysis) -> dict[str, Any]:
     """The spread of rays by waviness, for tolerance.json; pixels share the target's disc."""
     waviness = analysis.process.waviness_um.magnitude * MICROMETRE
     spread = np.concatenate([_mirror_spreads(model, waviness) for model in analysis.edge_models])
-    pixels = np.median(analysis.result.pixels)
+    numbers = virtual_camera_numbers(analysis.edge_models[1].halved)
+    pixels = np.bincount(numbers, np.concatenate([*map(_picture_sizes, analysis.cameras)]))
     return {
         "median": float(np.median(spread)),
         "largest": float(spread.max()),
-        "pixel_width_median": (
-            float(analysis.target * np.sqrt(np.pi / 4 / pixels)) if pixels else 0.0
-        ),
+        "pixel_width_median": float(analysis.target * np.sqrt(np.pi / 4 / np.median(pixels))),
     }
+
+
+def _picture_sizes(at: Reflector) -> Floats:
+    """Size of each cell's picture as designed, by the polygon of its corners, pixels, (m,)."""
+    arcs, corner = at.cells.arcs, at.camera.project(at.cells.corners)
+    (x, y), (next_x, next_y) = corner[arcs.start].T, corner[arcs.end].T
+    area, total = (x * next_y - next_x * y) / 2, np.zeros(len(at.cells.surfaces))
+    np.add.at(total, arcs.left, area)
+    np.subtract.at(total, arcs.right, area)
+    return np.abs(total[: len(at)])
 
 
 def _mirror_spreads(model: EdgeModel, waviness: float) -> Floats:
@@ -268,8 +276,8 @@ def _process_table(analysis: Analysis) -> Table:
             "yield": option.estimate.share,
             "yield_low": option.estimate.low,
             "yield_high": option.estimate.high,
-            "margin_needed_mm": (option.margin or NOT_SEARCHED).mm,
-            "reason": (option.margin or NOT_SEARCHED).reason,
+            "margin_needed_mm": option.margin.mm,
+            "reason": option.margin.reason,
         }
         for option in analysis.process_options
     ]

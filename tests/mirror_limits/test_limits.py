@@ -101,7 +101,7 @@ def test_losses_are_those_of_mirrors_that_deviate_one_by_one(
         one_by_one = Deviation.none(m, m)
         np.fill_diagonal(one_by_one.offset, sign)
         others = Deviation.none(m, m).draws(models[1])
-        lost.append(found.coverage - coverage(models, (one_by_one.draws(models[half]), others))[0])
+        lost.append(found.coverage - coverage(models, (one_by_one.draws(models[half]), others)))
     slow = np.maximum(np.max(lost, axis=0), 0)
     of_half = found.mirror < m
     fast = np.zeros_like(slow)
@@ -128,7 +128,7 @@ def test_the_standard_deviations_give_the_yield(
         tilt = normal[..., 1:3] * each[:, 1, None]
         off = normal[..., 0] * each[:, 0], tilt, normal[..., 3] * each[:, 2], 0 * normal[..., 0]
         draws.append(Deviation(*off).draws(model))
-    worst = coverage(models, (draws[0], draws[1]), worst_only=True)[0].min(axis=1)
+    worst = coverage(models, (draws[0], draws[1]), worst_only=True).min(axis=1)
     spread = np.sqrt(wanted * (1 - wanted) / builds)
     assert (worst >= TARGET).mean() >= wanted - 3 * spread
 

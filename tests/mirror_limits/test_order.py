@@ -135,7 +135,7 @@ def test_mandrel_and_nickel_share_the_limit(written: Path) -> None:
         for centre, radius, waviness in ((0.25, 0.25, 0.06), (0.1, 0.1, 0.05))
     )
     read = read_tolerances(written / "mandrel_a_tolerances.step")
-    zones = sorted(one.value for one in read if one.kind == "profile")
+    zones = sorted(one.value for one, _ in read if one.kind == "profile")
     parts = table(written, "offset_limit_um") * mandrel / (mandrel + nickel)
     assert zones == pytest.approx(np.sort(2e-3 * parts), abs=3e-6)
     whole = 2 * hypot(0.25, 0.25, 0.1, 0.1, defocus * 0.06, defocus * 0.05)

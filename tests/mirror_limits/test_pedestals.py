@@ -11,11 +11,15 @@ from OCP.TopoDS import TopoDS_Face
 
 from tbcad.app.api import order
 from tbcad.cad.formats.step import StepError, read_named_solid
-from tbcad.cad.formats.step_tolerances import FaceTolerances, read_tolerances, write_tolerances
+from tbcad.cad.formats.step_tolerances import (
+    check_read_back,
+    read_tolerances,
+    write_tolerances,
+)
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.pedestals.cells import groove_walls
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
-from tbcad.mirror_limits.files import Half, check_read_back, dowel_face, halves, tolerances
+from tbcad.mirror_limits.files import dowel_face, halves, tolerances
 from tbcad.mirror_limits.order import found_limits, minimum_at_limits
 from tbcad.mirror_limits.sensitivity import MirrorLimits, Sensitivities, sensitivities
 from tbcad.shell.files import wall_names
@@ -90,10 +94,11 @@ def test_files_name_walls_and_their_limits(
     assert min(float(row["wall_limit_um"]) for row in rows) >= smallest["wall_um"] > 0
     assert record["simulated_minimum_mm"] >= TARGET
     read = read_tolerances(tmp_path / "out" / "shell_b_tolerances.step")
-    assert sum(one.kind == "profile" and one.centre is not None for one in read) == len(rows)
-    zones = [one for one in read if one.kind == "profile" and one.planes]
-    assert all(one.datums == ("A", "B", "C") for one in zones)
-    assert sum(len(one.planes) for one in zones) == len(groove_walls(made.arrays[1].cells))
+    profiles = [(one, frame) for one, frame in read if one.kind == "profile"]
+    zones = [one for one, _ in profiles if "_" in one.faces[0]]
+    assert len(profiles) - len(zones) == len(rows)
+    assert all(frame == ("A", "B", "C") for _, frame in profiles)
+    assert sum(len(one.faces) for one in zones) == len(groove_walls(made.arrays[1].cells))
     widths = sorted(one.value for one in zones)
     asked = sorted(2e-3 * float(row["wall_limit_um"]) for row in rows)
     assert widths == pytest.approx(asked, abs=1e-9)
@@ -115,29 +120,28 @@ def test_a_solid_that_is_read_has_each_face_by_its_name(folder: Path, made: Mirr
         assert abs((point - at) @ axis) < 1e-8
 
 
-@pytest.fixture(scope="module")
-def half(export: ExportedDesign, found: tuple[Sensitivities, MirrorLimits]) -> Half:
-    return halves(export, found[1], found[1].each)[0]
-
-
-@pytest.fixture(scope="module")
-def given(folder: Path, half: Half) -> FaceTolerances:
-    """Written beside the shell."""
-    solid = read_named_solid(folder / "shell_a.step")
-    result = tolerances(half, dowel_face(solid, half.dowel_mm))
-    write_tolerances(folder / "toleranced.step", solid, result)
-    return result
-
-
-def test_zones_of_walls_that_are_not_as_given_are_refused(
-    folder: Path, half: Half, given: FaceTolerances
+def test_tolerances_that_are_not_as_given_are_refused(
+    folder: Path, export: ExportedDesign, found: tuple[Sensitivities, MirrorLimits], tmp_path: Path
 ) -> None:
-    (first, width), (second, other), *rest = given.common_profile.items()
-    check_read_back(folder / "toleranced.step", given, half)
+    half = halves(export, found[1], found[1].each)[0]
+    solid = read_named_solid(folder / "shell_a.step")
+    given, file = tolerances(half, dowel_face(solid, half.dowel_mm)), tmp_path / "toleranced.step"
+    write_tolerances(file, solid, given)
+    check_read_back(file, given)
+    first, second = [one for one in given.each if one.kind == "profile"][-2:]
+    radius = given.each[-1]
+    swapped = (
+        replace(first, faces=(*first.faces[1:], second.faces[0])),
+        replace(second, faces=(first.faces[0], *second.faces[1:])),
+    )
+    rest = [one for one in given.each if one not in (first, second)]
     for changed, message in (
-        ({first: width / 2, second: other}, "read otherwise"),
-        ({(*first[1:], second[0]): width, (first[0], *second[1:]): other}, "zones of walls"),
+        ((*rest, replace(first, value=first.value / 2), second), "read otherwise"),
+        ((*given.each[:-1], replace(radius, radius=radius.radius + 1)), "read otherwise"),
+        ((*rest, *swapped), "are not those"),
+        (rest, "are not those"),
     ):
-        wrong = replace(given, common_profile={**changed, **dict(rest)})
         with pytest.raises(StepError, match=message):
-            check_read_back(folder / "toleranced.step", wrong, half)
+            check_read_back(file, replace(given, each=changed))
+    with pytest.raises(StepError, match="profile of a0001 is read otherwise"):
+        check_read_back(file, replace(given, datums=dict(reversed(given.datums.items()))))

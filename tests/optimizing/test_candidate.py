@@ -12,7 +12,7 @@ from tbcad.core.spec.load import load_spec, spec_dict
 from tbcad.light.reconstruction import picture
 from tbcad.light.reconstruction.picture import BY_FIELD
 from tbcad.light.reconstruction.start import Level, Settings
-from tbcad.light.simulate.capture.photograph import Sensor
+from tbcad.light.simulate.capture.photograph import Sensor, virtual_camera_pixels
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.views.viewpoints import viewpoints_around
 from tbcad.optimizing import candidate
@@ -25,7 +25,6 @@ from tbcad.optimizing.candidate import (
     place_of,
     placed,
     size_of,
-    virtual_camera_pixels,
 )
 from tbcad.studies.ssim import ssim
 
@@ -39,9 +38,7 @@ def few() -> MirrorDesign:
 
 
 def test_figures_are_those_of_all_virtual_cameras(few: MirrorDesign) -> None:
-    pixels, number = virtual_camera_pixels(few.arrays[0], few.spec)
-    each = np.concatenate([np.full(k, p) for p, k in zip(pixels, number, strict=True)])
-    figures = figures_of(few)
+    each, figures = virtual_camera_pixels(few.arrays[0], 30.0), figures_of(few)
     assert figures.minimum_px == each.min()
     assert figures.median_px == np.median(each)
     assert figures.mean_log_px == pytest.approx(np.log(each).mean(), rel=1e-12)

@@ -57,12 +57,6 @@ def test_all_facets_face_the_light(options: list[str]) -> None:
     assert dot(normals_of(corner), toward_light).min() > 0
 
 
-def test_area_of_facets_is_that_of_the_cells(paper_design: MirrorDesign) -> None:
-    facets = facets_of(paper_design)
-    area = norm(normals_of(facets.vertices[facets.triangles])) / 2
-    assert area.sum() == pytest.approx(paper_design.arrays[0].area.sum(), rel=1e-3)
-
-
 def rim_facets(
     mirrors: MirrorDesign, written_as: type[np.floating]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,37 +1,22 @@
-"""Builds by slow and independent means: cells of known topology, meshes, brute force."""
+"""Builds by slow and independent means: cells of known topology, brute force."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tbcad_verify.mesh.mesh import mesh_from_facets
-from tbcad_verify.mesh.stl import parse
-from tbcad_verify.record.export import Export
-from tbcad_verify.record.export import read_export as read_record
-from tbcad_verify.record.files import read
-from tbcad_verify.shell.optics import OpticalSetup, set_up
-from tbcad_verify.shell.outline import minimum_miss_distance, reflect_on_fits, trace_outline
-from tbcad_verify.shell.recover import recover
 
-from tbcad.cad.formats.mesh_files import write_stl
-from tbcad.cad.kernel.mesh import Mesh
-from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
-from tbcad.core.mirrors.record import write_record
+from tbcad.core.mirrors.array import MirrorArray
 from tbcad.core.optics import windows
 from tbcad.core.optics.cells import Cells, cells_of
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES
 from tbcad.core.optics.reflection import miss_distances, reflected_rays
 from tbcad.core.optics.surfaces import Surfaces
-from tbcad.output.manifest import write_manifest
-from tbcad.shell.files import shell_envelope
-from tbcad.shell.mesh import shell_mesh
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, SmoothField
 
 FINE = 5  # rounds of refinement with which the slow tracing is good to 1e-8 mm
@@ -87,60 +72,6 @@ def _counted(cells: Cells, whole: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     mirror, other = faces[arc, which], faces[arc, 1 - which]
     counted = whole[mirror] | (other != cells.seam)
     return mirror[counted], arc[counted]
-
-
-def write_meshes(
-    design: MirrorDesign, draws: tuple[ShellDraws, ShellDraws], k: int, folder: Path
-) -> None:
-    """Write both shells of build k as STL files, as the exporter would."""
-    first, body = design.arrays[0], shell_envelope(design)
-    for array, drawn in zip(design.arrays, draws, strict=True):
-        own = made(array, drawn, k)
-        facets = shell_mesh(
-            design.spec, own if array is first else own.mirrored(), body, first.apex_distance
-        )
-        facets = facets if array is first else facets.mirrored()
-        turn = Rotation.from_rotvec(drawn.shell_tilt[k])
-        points = turn.apply(facets.vertices * drawn.scale[k]) + drawn.shell_shift[k]
-        write_stl(folder / f"shell_{array.camera_id}.stl", Mesh(points, facets.triangles))
-
-
-def read_record_of(made: MirrorDesign, folder: Path) -> Export:
-    """The record of a design as the verification reads it; its meshes may then be replaced."""
-    write_record(folder, made, shells=True)
-    write_manifest(folder, "build")
-    return read_record(folder)
-
-
-def verified_coverage(record: Export, shifts: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Coverage of every virtual camera by the verification's own reading of STL files, mm, (v,)."""
-    cameras = {
-        name: camera.model_copy(update={"pinhole": camera.pinhole + shifts[name]})
-        for name, camera in record.cameras.items()
-    }
-    record = replace(record, cameras=cameras)
-    meshes = [mesh_from_facets(parse(read(record.folder, part.stl))) for part in record.parts]
-    found = [
-        recover(one, cameras[part.camera].pinhole, record.target_mm / 2)
-        for one, part in zip(meshes, record.parts, strict=True)
-    ]
-    return _minimum_coverage(set_up(record, meshes, found))
-
-
-def _minimum_coverage(setup: OpticalSetup) -> np.ndarray:
-    """Minimum coverage by tbcad_verify.shell.coverage, without the check of the seam gaps."""
-    virtual, owner, coat = setup.virtual, setup.owner(), setup.export.coating_mm
-    outlines = [
-        trace_outline(setup.mesh, setup.recovery, owner, coat, setup.mine(camera), virtual.halved)
-        for camera in setup.cameras
-    ]
-    lines = [
-        reflect_on_fits(outline, setup.seen(camera))
-        for outline, camera in zip(outlines, setup.cameras, strict=True)
-    ]
-    assert (setup.match.segment >= 0).all()
-    pairs = zip(outlines, lines, strict=True)
-    return 2 * np.min([minimum_miss_distance(o, at, virtual) for o, at in pairs], axis=0)
 
 
 def surrounded(array: MirrorArray, shift: np.ndarray) -> np.ndarray:

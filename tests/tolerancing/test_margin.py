@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import sqrt
-from statistics import NormalDist
 from unittest.mock import Mock
 
 import numpy as np
@@ -98,24 +97,6 @@ class TestMadeUpLosses:
         assert found.mm == pytest.approx(brute(lost, wanted), abs=1e-9)
         assert found.share == (found.mm >= lost).mean() >= wanted
 
-    @pytest.mark.parametrize("seed", range(3))
-    def test_never_a_margin_with_too_small_a_share(self, spec: Spec, seed: int) -> None:
-        """Losses that change with the margin without any rule."""
-        generator = np.random.default_rng(seed)
-        wanted = float(generator.uniform(0.2, 0.999))
-        told: list[float] = []
-
-        def worst(_: Errors, __: EdgeModels) -> np.ndarray:
-            seen = TARGET + generator.normal(0.3, 0.5, 50)
-            told.append(float((seen >= TARGET).mean()))
-            return seen
-
-        found = margin(spec, Errors(), wanted, worst)
-        assert found.share == told[-1]
-        assert (found.mm is not None) == (found.reason == "")
-        if found.mm is not None:
-            assert found.share >= wanted
-
     @pytest.mark.parametrize(
         "loss", [steady(MAX_MARGIN + 0.001), lambda m: np.full(10, m + 1)], ids=["much", "growing"]
     )
@@ -137,23 +118,6 @@ def test_mirrors_that_cannot_be_made(spec: Spec) -> None:
     assert found.reason == "mirrors of margin 2.00 mm: mirrors overlap"
 
 
-@pytest.mark.slow
-def test_margin_gives_the_yield(spec: Spec) -> None:
-    """Made anew with the margin that was found, and with builds of the same numbers."""
-    made, wanted = process_errors(load_process("sla")), 0.9
-
-    def worst(errors: Errors, models: EdgeModels) -> np.ndarray:
-        return simulate(MonteCarloCase(models, errors, 1), 40).worst
-
-    def share(mm: float) -> float:
-        return float((worst(made, models_of("n=4", f"margin_mm={mm:.2f}")) >= TARGET).mean())
-
-    found = margin(spec, made, wanted, worst)
-    assert found.mm is not None
-    assert share(found.mm) == found.share >= wanted
-    assert share(found.mm - 2 * STEP_MM) < wanted
-
-
 def unsymmetric(loss: np.ndarray) -> MirrorLosses:
     """Losses (s, 2, m) of mirrors of which none is nearly flat nor another's image."""
     m = loss.shape[2]
@@ -166,18 +130,6 @@ def normal_losses(builds: int, mean: np.ndarray, deviation: np.ndarray, seed: in
 
 
 class TestKnownLosses:
-    @pytest.mark.parametrize("wanted", [0.5, 0.9, 0.99])
-    def test_independent_normal_losses(self, wanted: float) -> None:
-        """All 2 m losses stay below m + z s with the probability Phi(z)^(2 m)."""
-        generator = np.random.default_rng(1)
-        mean, deviation = generator.uniform(0, 2, 25), generator.uniform(0.2, 1, 25)
-        margins = needed_margins(
-            unsymmetric(normal_losses(40_000, mean, deviation, seed=2)), wanted
-        )
-        z = NormalDist().inv_cdf(wanted ** (1 / 50))
-        assert (margins - mean) / deviation == pytest.approx(np.full(25, z), abs=0.15)
-        assert np.mean((margins - mean) / deviation) == pytest.approx(z, abs=0.04)
-
     @pytest.mark.parametrize("wanted", [0.5, 0.9, 0.985, 0.99])
     @pytest.mark.parametrize("seed", range(3))
     def test_least_level_by_brute_force(self, wanted: float, seed: int) -> None:

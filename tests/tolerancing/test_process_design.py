@@ -11,9 +11,10 @@ from tbcad.app.cli import run
 from tbcad.core.mirrors.array import design
 from tbcad.core.spec.load import load_spec, spec_dict
 from tbcad.errors import InputError
+from tbcad.light.simulate.capture.photograph import virtual_camera_pixels
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing import process_design as process_module
-from tbcad.tolerancing.margin import OwnMargins, SeeingPixels, pixels_of_cameras, seeing_pixels
+from tbcad.tolerancing.margin import OwnMargins, SeeingPixels, seeing_pixels
 from tbcad.tolerancing.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerancing.montecarlo.edge_model import edge_models
 from tbcad.tolerancing.process.process import Process, load_process, process_errors
@@ -53,7 +54,7 @@ def test_own_margins_where_they_are_smaller() -> None:
     case = MonteCarloCase(models, process_errors(process), process_module.SEED)
     assert (simulate(case, BUILDS).worst >= 60).mean() >= wanted
     even, best = (
-        pixels_of_cameras(design(one).arrays[0], 30.0).sum()
+        virtual_camera_pixels(design(one).arrays[0], 30.0).sum()
         for one in (load_spec(None, ["n=4", f"margin_mm={made.even_mm}"]), made.spec)
     )
     assert best > even
@@ -79,7 +80,7 @@ def test_what_margins_cost() -> None:
     ratio = costs["with these margins"].median / costs["with none"].median
     assert ratio == pytest.approx((60 / 63) ** 2, abs=0.01)
     half = design(spec).arrays[0]
-    each = pixels_of_cameras(half, 30.0)
+    each = virtual_camera_pixels(half, 30.0)
     assert costs["with these margins"].minimum == each.min()
     assert len(each) == 2 * len(half) - (half.u[:, 0] == 0).sum()
     assert costs_text(costs).count("minimum") == 2

@@ -1,14 +1,12 @@
-"""The fast model of simulated builds against closed forms, slow tracing and the verification.
+"""The fast model of simulated builds against closed forms, slow tracing and brute force.
 
 Of mirrors that meet in valleys and of those on pedestals.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +16,7 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.reflection import miss_distances
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, as_made, scaled, simulate
-from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage, pointing
+from tbcad.tolerancing.montecarlo.coverage import mirror_coverage, pointing
 from tbcad.tolerancing.montecarlo.draws import (
     ShellDraws,
     draw,
@@ -35,10 +33,7 @@ from tests.tolerancing.exact_builds import (
     bisected_coverage,
     displaced_coverage,
     last_inside,
-    read_record_of,
     traced_coverage,
-    verified_coverage,
-    write_meshes,
 )
 
 # What a careless maker might leave; even scale only, as the slow means know no other.
@@ -51,7 +46,7 @@ COARSE = Errors(
 )
 POSED = replace(COARSE, shell_shift=Error(0.2), shell_tilt=Error(0.002))
 SLA = Errors(warp=Error(0.0346, length=50.0))
-WIDE = 16.0  # mm, of a mirror about its apex: see test_warp
+WIDE = 16.0  # mm, of a mirror about its apex; wider ones bend as no sphere with astigmatism does
 PEDESTAL = "shell.edges=pedestal"
 
 
@@ -116,22 +111,6 @@ def test_without_errors_it_is_the_design(settings: tuple[str, ...]) -> None:
         assert (found.crossings[0, ~half.halved] % 2 == 1).all()
 
 
-def test_without_errors_it_is_the_paper_design(paper_design: MirrorDesign) -> None:
-    """Within 1e-6 mm of the slow tracing with finer samples.
-
-    The coverage that the design records is off by up to 5.6e-6 mm: its samples' parabola.
-    """
-    halves = edge_models(reflectors(paper_design))
-    draws = tuple(perfect(fast) for fast in halves)
-    for half, fast, drawn in zip(paper_design.arrays, halves, draws, strict=True):
-        found = mirror_coverage(fast, drawn).diameter[0]
-        assert np.abs(found - traced_coverage(half, drawn, 0)).max() < 1e-6
-        assert np.abs(found - half.coverage).max() < 1e-5
-    every, _ = coverage(halves, draws)
-    assert every.shape == (1, 1657)
-    assert every.min() == pytest.approx(60.6, abs=1e-3)
-
-
 # One error whose effect is known
 
 
@@ -153,15 +132,12 @@ def test_what_moves_together_changes_nothing(halves: EdgeModels) -> None:
     moved = replace(still, shell_tilt=turn, camera_tilt=turn, camera_shift=shift[None])
     before, after = mirror_coverage(halves[0], still), mirror_coverage(halves[0], moved)
     assert after.diameter == pytest.approx(before.diameter, abs=1e-9)
-    assert after.pixels == pytest.approx(before.pixels, rel=1e-9)
-    angle, offset = pointing(halves[0], moved)
+    offset = pointing(halves[0], moved)
     way, nearest = designed_rays(halves[0])
-    turned = np.arccos(np.einsum("mx,mx->m", way, rotation.apply(way)))
     # Of a mirror on the seam the object's point that its ray was aimed at has not moved.
     left = np.cross(rotation.apply(nearest) - nearest, rotation.apply(way))
     assert offset[0] == pytest.approx(np.linalg.norm(left, axis=1), abs=1e-9)
     assert offset[0, ~halves[0].halved].max() < 1e-9
-    assert angle[0] == pytest.approx(turned, abs=1e-9)
 
 
 def test_moved_shell_is_moved_camera_and_object(halves: EdgeModels) -> None:
@@ -171,8 +147,7 @@ def test_moved_shell_is_moved_camera_and_object(halves: EdgeModels) -> None:
     together = replace(still, shell_shift=shift, camera_shift=shift)
     way, _ = designed_rays(halves[0])
     across = shift - np.einsum("mx,kx->mk", way, shift) * way
-    assert pointing(halves[0], together)[1][0] == pytest.approx(np.linalg.norm(across, axis=1))
-    assert pointing(halves[0], together)[0].max() < 1e-12
+    assert pointing(halves[0], together)[0] == pytest.approx(np.linalg.norm(across, axis=1))
 
 
 @pytest.mark.parametrize("size", [0.98, 1.03])
@@ -182,72 +157,10 @@ def test_larger_build_covers_more_in_proportion(halves: EdgeModels, size: float)
     larger = replace(still, scale=row(size, size, size), camera_shift=(size - 1) * pinhole[None])
     before, after = mirror_coverage(halves[0], still), mirror_coverage(halves[0], larger)
     assert after.diameter == pytest.approx(size * before.diameter, abs=1e-9)
-    assert after.pixels == pytest.approx(before.pixels, rel=1e-9)
-    angle, offset = pointing(halves[0], larger)
+    offset = pointing(halves[0], larger)
     # The rays of mirrors on the seam, which are aimed beside the middle, keep their proportion too.
     beside = np.linalg.norm(designed_rays(halves[0])[1], axis=1)
     assert offset[0] == pytest.approx(abs(size - 1) * beside, abs=1e-12)
-    assert angle.max() < 1e-12
-
-
-def lever(half: EdgeModel, start: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First-order offset and angle of rays to apices P moved by start and turned by (m, 3).
-
-    A ray along d that meets the tangent plane x off the apex finds the normal turned by x k
-    there, so that it leaves turned by the mirror image of its own turn and by
-    -2 ((d . x k) N + (d . N) x k), and arrives |P| farther at x and |P| times that, across itself.
-    """
-    apex, normal, curvature = np.split(half.table[:-2], [3, 6], axis=1)
-    way = apex - half.view.pinhole
-    far = np.linalg.norm(way, axis=1)[:, None]
-    d = way / far
-
-    def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return np.sum(a * b, axis=1)[:, None]
-
-    x = start + far * turn
-    x = x - d * dot(x, normal) / dot(d, normal)
-    bent = -2 * curvature * (dot(d, x) * normal + dot(d, normal) * x)
-    bent += turn - 2 * dot(turn, normal) * normal
-    out = d - 2 * dot(d, normal) * normal
-    moved = x + np.linalg.norm(apex, axis=1)[:, None] * bent
-    moved = moved - dot(moved, out) * out
-    return np.linalg.norm(moved, axis=1), np.linalg.norm(bent, axis=1)
-
-
-def shifted(half: EdgeModel, size: float) -> tuple[ShellDraws, np.ndarray, np.ndarray]:
-    shift = size * row(1.0, 2.0, -1.0)
-    return replace(perfect(half), camera_shift=shift), shift, np.zeros((1, 3))
-
-
-def tilted(half: EdgeModel, size: float) -> tuple[ShellDraws, np.ndarray, np.ndarray]:
-    turn = size / 100 * row(1.0, 2.0, -1.0)
-    way = half.table[:-2, :3] - half.view.pinhole
-    way /= np.linalg.norm(way, axis=1)[:, None]
-    return replace(perfect(half), camera_tilt=turn), np.zeros((1, 3)), np.cross(turn, way)
-
-
-def longer(half: EdgeModel, size: float) -> tuple[ShellDraws, np.ndarray, np.ndarray]:
-    """A pixel then stands for an angle of lesser tangent from the optical axis."""
-    way = half.table[:-2, :3] - half.view.pinhole
-    way /= np.linalg.norm(way, axis=1)[:, None]
-    forward = half.view.forward
-    radial = way - (way @ forward)[:, None] * forward
-    turn = -size / 100 * (radial - np.sum(radial * way, axis=1)[:, None] * way)
-    return replace(perfect(half), focal=np.array([1 + size / 100])), np.zeros((1, 3)), turn
-
-
-@pytest.mark.parametrize("error", [shifted, tilted, longer])
-def test_pointing_error_is_the_lever_of_a_curved_mirror(
-    halves: EdgeModels,
-    error: Callable[[EdgeModel, float], tuple[ShellDraws, np.ndarray, np.ndarray]],
-) -> None:
-    for array in halves:
-        draws, start, turn = error(array, 1e-4)
-        offset, angle = lever(array, start, turn)
-        found_angle, found_offset = pointing(array, draws)
-        assert found_offset[0] == pytest.approx(offset, rel=1e-3, abs=1e-8)
-        assert found_angle[0] == pytest.approx(angle, rel=1e-3, abs=1e-10)
 
 
 def test_radius_of_one_mirror_alone(halves: EdgeModels) -> None:
@@ -309,7 +222,6 @@ def test_uneven_scale_against_brute_force(halves: EdgeModels) -> None:
 
 
 def test_a_mirror_that_is_off_changes_no_other(parted: EdgeModels) -> None:
-    """Not by a bit: neither what they cover nor their pictures."""
     half, alone = parted[0], 40
     still = drawn(parted, Errors(), range(1))[0]
     centre, form = np.zeros_like(still.centre), np.zeros_like(still.form)
@@ -318,9 +230,8 @@ def test_a_mirror_that_is_off_changes_no_other(parted: EdgeModels) -> None:
         mirror_coverage(half, one) for one in (still, replace(still, centre=centre, form=form))
     )
     # With waviness an edge is displaced along plane and sphere: by nothing where there is none.
-    for name in ("diameter", "pixels"):
-        changed = np.flatnonzero(np.abs(getattr(after, name) - getattr(before, name))[0] > 1e-9)
-        assert changed.tolist() == [alone], name
+    changed = np.flatnonzero(np.abs(after.diameter - before.diameter)[0] > 1e-9)
+    assert changed.tolist() == [alone]
     spheres = mirror_coverage(half, replace(still, centre=centre)).diameter[0]
     assert np.flatnonzero(spheres != before.diameter[0]).tolist() == [alone]
 
@@ -358,15 +269,16 @@ def test_moved_walls_and_uneven_scale_against_brute_force(parted: EdgeModels) ->
     assert abs(found - mirror_coverage(parted[1], one).diameter[0, mirror]) > 0.02
 
 
-def test_warped_builds_against_displaced_material(parted: EdgeModels) -> None:
+@pytest.mark.parametrize("edges", ["valley", "pedestal"])
+def test_warped_builds_against_displaced_material(edges: str) -> None:
     """Halves whose every point is displaced: walls go along with the mirrors that they end."""
-    length, builds = SLA.warp.length, 1
-    chosen = pivots(parted[0].apex, length)
-    fields = [smooth_field(half.apex, length, chosen) for half in parted]
-    shapes = shell_error_shapes(len(parted[0]), len(chosen))
+    halves, length, builds = models(edges), SLA.warp.length, 1
+    chosen = pivots(halves[0].apex, length)
+    fields = [smooth_field(half.apex, length, chosen) for half in halves]
+    shapes = shell_error_shapes(len(halves[0]), len(chosen))
     numbers = draw_kinds(SLA, 7, range(builds), shapes)["warp"]
-    draws = drawn(parted, SLA, range(builds))
-    for side, (half, array) in enumerate(zip(parted, small("pedestal").arrays, strict=True)):
+    draws = drawn(halves, SLA, range(builds))
+    for side, (half, array) in enumerate(zip(halves, small(edges).arrays, strict=True)):
         fast = mirror_coverage(half, draws[side]).diameter
         fixed = replace(draws[side], wall=np.zeros_like(draws[side].wall))
         without = mirror_coverage(half, fixed).diameter
@@ -375,7 +287,8 @@ def test_warped_builds_against_displaced_material(parted: EdgeModels) -> None:
             exact = displaced_coverage(array, fields[side], numbers[k, side])
             assert fast[k].min() == pytest.approx(exact.min(), abs=0.05)
             assert np.abs(fast[k] - exact)[whole].max() < 0.05
-            assert np.abs(without[k] - exact)[whole].max() > 0.2
+            if edges == "pedestal":
+                assert np.abs(without[k] - exact)[whole].max() > 0.2
 
 
 def test_errors_of_neighbours_cost_less_than_where_spheres_meet(
@@ -405,32 +318,3 @@ def test_every_build_says_how_it_would_be_made() -> None:
         bad = np.append(0, (every < 60).cumsum())  # of the first k
         assert bad[50] < 3 if one.share >= 0.95 else bad[one.builds] >= 3 > bad[one.builds - 5]
         assert round(one.share * one.builds) == one.builds - bad[one.builds]
-
-
-# Verification of the files of builds
-
-
-@pytest.mark.parametrize(
-    ("edges", "errors", "build", "least"),
-    [
-        ("valley", COARSE, 0, 59.0),
-        ("valley", POSED, 20, 59.0),
-        ("pedestal", scaled(COARSE, 0.3), 0, 60.3),
-    ],
-)
-def test_random_builds_against_the_verification_of_their_meshes(
-    tmp_path: Path, edges: str, errors: Errors, build: int, least: float
-) -> None:
-    """Both shells meshed, written, read, mirrors found and measured: within 0.05 mm.
-
-    The verification takes x = 0 for the seam, so mirrors halved by a moved seam are left out.
-    """
-    made, halves, record = small(edges), models(edges), read_record_of(small(edges), tmp_path)
-    draws = drawn(halves, errors, range(build, build + 1))
-    fast, _ = coverage(halves, draws)
-    kept = np.ones(fast.shape[1], dtype=bool)
-    kept[: len(halves[0])] = (errors is not POSED) | ~halves[0].halved
-    write_meshes(made, draws, 0, record.folder)
-    shifts = {name: one.camera_shift[0] for name, one in zip("ab", draws, strict=True)}
-    assert np.abs(fast[0] - verified_coverage(record, shifts))[kept].max() < 0.05
-    assert fast.min() < least  # the meshes are not the design's

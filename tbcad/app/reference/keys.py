@@ -99,7 +99,7 @@ def _type(kind: Any) -> str:
     if get_origin(kind) is Literal:
         texts = all(isinstance(choice, str) for choice in get_args(kind))
         return "one of several words" if texts else "whole number"
-    return TYPES.get(kind, "whole number or word")
+    return TYPES[kind]
 
 
 WIDTH = 100

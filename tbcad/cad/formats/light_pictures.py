@@ -1,6 +1,6 @@
 """Pictures of light: Radiance's (.hdr), and OpenEXR's, read in a process of its own.
 
-Radiance has shared exponents, in runs of either kind (G. Ward, Real Pixels, Graphics Gems II, 1991;
+Radiance has shared exponents, as they are or in runs (G. Ward, Real Pixels, Graphics Gems II, 1991;
 Radiance, File Formats, "Picture (.hdr)"). OpenEXR's library writes its complaints to both streams
 of the process, and damaged files have ended it.
 """
@@ -10,7 +10,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -23,13 +22,13 @@ from tbcad.errors import InputError
 from tbcad.types import Bytes, Floats
 
 HDR_SIGNATURE = b"#?"
-HDR_FORMATS = ("32-bit_rle_rgbe", "32-bit_rle_xyze")
+HDR_FORMAT = "32-bit_rle_rgbe"
 EXPONENT = 128 + 8  # bias, and bits of a mantissa
-RUN_WIDTHS = range(8, 32_768)  # of scanlines that may have runs of the newer kind
-# Chromaticities of red, green, blue and white: those of Radiance; BT.709's are as near as eyes see.
-PRIMARIES = (0.640, 0.330, 0.290, 0.600, 0.150, 0.060, 1 / 3, 1 / 3)
+RUN_WIDTHS = range(8, 32_768)  # of scanlines that may have runs
+# Chromaticities of red, green and blue: those of Radiance; BT.709's are as near as eyes see.
+PRIMARIES = (0.640, 0.330, 0.290, 0.600, 0.150, 0.060)
 PRIMARIES_ALIKE = 0.011
-_RESOLUTION = re.compile(rb"([-+])([XY]) +(\d{1,9}) +([-+])([XY]) +(\d{1,9})\n")
+_RESOLUTION = re.compile(rb"([-+][XY]) +(\d{1,9}) +([-+][XY]) +(\d{1,9})\n")
 EXR_SIGNATURE = b"\x76\x2f\x31\x01"
 _NUMPY = b"\x93NUMPY"
 GIVE = "save it as one picture of channels R, G and B"
@@ -37,59 +36,36 @@ GIVE = "save it as one picture of channels R, G and B"
 _REC_709, _ALIKE = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06), 0.011
 
 
-@dataclass(frozen=True)
-class _Header:
-    """What stands before the pixels."""
-
-    xyz: bool  # whether they are CIE XYZ rather than red, green, blue
-    scale: Floats  # factor of red, green, blue, (3,)
-    major: str  # axis along which scanlines follow each other: "+X", "-Y" ...
-    minor: str  # axis along one
-    shape: tuple[int, int]  # scanlines, pixels in each
-    start: int  # of the pixels, in bytes
-
-
 def hdr_picture(data: bytes, name: str) -> Floats:
     """Red, green and blue (h, w, 3), linear, before EXPOSURE and COLORCORR; the top row first.
 
-    InputError if it ends early, is damaged, or has other primaries.
+    InputError if it ends early, is damaged, has other primaries, or its scanlines another order.
     """
-    header = _header(data, name)
-    try:
-        pixels = np.stack(list(_scanlines(data, header.start, *header.shape)))
-    except (IndexError, ValueError) as error:
-        reason = "it ends early" if isinstance(error, IndexError) else error
-        raise damaged(name, reason) from None
-    light = pixels[..., :3] * np.ldexp(1.0, pixels[..., 3:].astype(np.int64) - EXPONENT)
-    light[pixels[..., 3] == 0] = 0
-    rgb = np.maximum(light @ np.linalg.inv(_to_xyz()).T, 0) if header.xyz else light
-    return _upright(rgb * header.scale, header.major, header.minor)
-
-
-def _header(data: bytes, name: str) -> _Header:
     end = data.find(b"\n\n")
     resolution = _RESOLUTION.match(data, end + 2) if end >= 0 else None
-    if not data.startswith(HDR_SIGNATURE) or resolution is None or resolution[2] == resolution[5]:
+    if not data.startswith(HDR_SIGNATURE) or resolution is None:
         raise damaged(name, "it has no header of Radiance's format")
     values: dict[str, list[str]] = {}
     for line in data[:end].decode("latin-1").splitlines():
         key, equals, value = line.partition("=")
         if equals:
             values.setdefault(key, []).append(value.strip())
-    kind = values.get("FORMAT", HDR_FORMATS[:1])[-1]
-    if kind not in HDR_FORMATS:
-        raise InputError(f"{name} is of format {kind}: allowed are {' and '.join(HDR_FORMATS)}")
+    kind = values.get("FORMAT", [HDR_FORMAT])[-1]
+    if kind != HDR_FORMAT:
+        raise InputError(f"{name} is of format {kind}, allowed is {HDR_FORMAT}: convert it")
+    if resolution[1] + resolution[3] != b"-Y+X":
+        raise InputError(f"{name} has scanlines in another order than -Y +X: turn it with pflip")
     _check_primaries(values.get("PRIMARIES", []), name)
-    shape = int(resolution[3]), int(resolution[6])
+    shape = int(resolution[2]), int(resolution[4])
     check_pixels(name, *shape)
-    return _Header(
-        xyz=kind == HDR_FORMATS[1],
-        scale=_scale(values, name),
-        major=(resolution[1] + resolution[2]).decode(),
-        minor=(resolution[4] + resolution[5]).decode(),
-        shape=shape,
-        start=resolution.end(),
-    )
+    try:
+        pixels = np.stack(list(_scanlines(data, resolution.end(), *shape)))
+    except (IndexError, ValueError) as error:
+        reason = "it ends early" if isinstance(error, IndexError) else error
+        raise damaged(name, reason) from None
+    light = pixels[..., :3] * np.ldexp(1.0, pixels[..., 3:].astype(np.int64) - EXPONENT)
+    light[pixels[..., 3] == 0] = 0
+    return np.asarray(light * _scale(values, name))
 
 
 def _scale(values: dict[str, list[str]], name: str) -> Floats:
@@ -107,7 +83,7 @@ def _scale(values: dict[str, list[str]], name: str) -> Floats:
 def _check_primaries(texts: list[str], name: str) -> None:
     for text in texts:
         found = _numbers(text, "PRIMARIES", name)
-        if len(found) != 8 or np.abs(found - PRIMARIES)[:6].max() > PRIMARIES_ALIKE:
+        if len(found) != 8 or np.abs(found[:6] - PRIMARIES).max() > PRIMARIES_ALIKE:
             raise InputError(
                 f"{name} has PRIMARIES={text}, other colours than those of Rec. 709: convert it, "
                 "for instance with Radiance's ra_xyze -r"
@@ -127,13 +103,18 @@ def _scanlines(data: bytes, at: int, lines: int, width: int) -> Iterator[Bytes]:
         if width in RUN_WIDTHS and data[at : at + 2] == b"\2\2" and data[at + 2] < 128:
             if int.from_bytes(data[at + 2 : at + 4], "big") != width:
                 raise ValueError("a scanline has another width")
-            line, at = _newer_runs(data, at + 4, width)
+            line, at = _runs(data, at + 4, width)
         else:
-            line, at = _pixels(data, at, width)
+            line = np.frombuffer(data[at : at + 4 * width], np.uint8).reshape(-1, 4)
+            if (line[:, :3] == 1).all(axis=1).any():
+                raise ValueError("it has runs of before 1991")
+            if len(line) < width:
+                raise IndexError
+            at += 4 * width
         yield line
 
 
-def _newer_runs(data: bytes, at: int, width: int) -> tuple[Bytes, int]:
+def _runs(data: bytes, at: int, width: int) -> tuple[Bytes, int]:
     """A scanline (w, 4) of four channels in runs, and where the next begins."""
     line = bytearray()
     for end in range(width, 5 * width, width):
@@ -148,44 +129,6 @@ def _newer_runs(data: bytes, at: int, width: int) -> tuple[Bytes, int]:
             if count == 0 or len(line) > end:
                 raise ValueError("a run does not fit its scanline")
     return np.frombuffer(line, np.uint8).reshape(4, width).T, at
-
-
-def _pixels(data: bytes, at: int, width: int) -> tuple[Bytes, int]:
-    """A scanline (w, 4) of pixels, (1, 1, 1, n) for n more of the last; and the next's begin."""
-    flat = np.frombuffer(data[at : at + 4 * width], np.uint8)
-    if len(flat) == 4 * width and not (flat.reshape(-1, 4)[:, :3] == 1).all(axis=1).any():
-        return flat.reshape(-1, 4), at + 4 * width
-    line, shift = bytearray(), 0
-    while len(line) < 4 * width:
-        pixel = data[at : at + 4]
-        if len(pixel) < 4:
-            raise IndexError
-        at += 4
-        if pixel[:3] != b"\1\1\1":
-            line += pixel
-            shift = 0
-            continue
-        count = pixel[3] << shift
-        if not line or count > width - len(line) // 4:
-            raise ValueError("a run does not fit its scanline")
-        line += line[-4:] * count
-        shift += 8
-    return np.frombuffer(line, np.uint8).reshape(-1, 4), at
-
-
-def _upright(picture: Floats, major: str, minor: str) -> Floats:
-    """Scanlines as rows from the top, pixels from the left: X is to the right, Y up."""
-    axes = major, minor
-    falling = tuple(axes.index(one) for one in ("+Y", "-X") if one in axes)
-    picture = np.flip(picture, axis=falling)
-    return np.ascontiguousarray(picture if major[1] == "Y" else picture.swapaxes(0, 1))
-
-
-def _to_xyz() -> Floats:
-    """CIE XYZ (3, 3) of Radiance's red, green, blue, in columns; white is (1, 1, 1)."""
-    x, y = np.reshape(PRIMARIES, (4, 2)).T
-    columns = np.stack([x / y, np.ones(4), (1 - x - y) / y])
-    return np.asarray(columns[:, :3] * np.linalg.solve(columns[:, :3], columns[:, 3]))
 
 
 def exr_picture(path: Path) -> NDArray[np.float32]:

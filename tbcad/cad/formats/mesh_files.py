@@ -4,6 +4,7 @@ PLY: G. Turk, The PLY Polygon File Format, 1994.
 """
 
 import ctypes
+from collections.abc import Sequence
 from math import sqrt
 from pathlib import Path
 from typing import Any
@@ -116,32 +117,24 @@ def _identifier(name: str, what: str) -> str:
 
 def points_ply(points: Floats, colours: Bytes) -> bytes:
     """The file of points (n, 3) with red, green and blue (n, 3)."""
-    lines = (
-        "ply",
-        "format binary_little_endian 1.0",
-        f"element vertex {len(points)}",
-        *PLY_PROPERTIES,
-        "end_header",
-    )
     vertices = np.zeros(len(points), dtype=PLY_VERTEX)
     vertices["place"], vertices["colour"] = points, colours
-    return ("\n".join(lines) + "\n").encode() + vertices.tobytes()
+    return _ply(len(points), PLY_PROPERTIES) + vertices.tobytes()
 
 
 def mesh_ply(points: Floats, normals: Floats, faces: Ints, colours: Floats | None = None) -> bytes:
     """The file of triangles (f, 3) over points, unit normals, colours from 0 to 1, (v, 3) each."""
     given = [points, normals] if colours is None else [points, normals, colours]
     names = [*"xyz", "nx", "ny", "nz", "red", "green", "blue"][: 3 * len(given)]
-    lines = (
-        "ply",
-        "format binary_little_endian 1.0",
-        f"element vertex {len(points)}",
-        *(f"property float {name}" for name in names),
-        f"element face {len(faces)}",
-        "property list uchar int vertex_indices",
-        "end_header",
-    )
     facets = np.zeros(len(faces), dtype=PLY_FACET)
     facets["corners"], facets["vertex"] = 3, faces
     vertices = np.concatenate(given, axis=1).astype("<f4")
-    return ("\n".join(lines) + "\n").encode() + vertices.tobytes() + facets.tobytes()
+    of_faces = f"element face {len(faces)}", "property list uchar int vertex_indices"
+    head = _ply(len(points), (*(f"property float {name}" for name in names), *of_faces))
+    return head + vertices.tobytes() + facets.tobytes()
+
+
+def _ply(vertices: int, lines: Sequence[str]) -> bytes:
+    """The head of a file of vertices with some properties, and of what comes after."""
+    head = "ply", "format binary_little_endian 1.0", f"element vertex {vertices}"
+    return ("\n".join([*head, *lines, "end_header"]) + "\n").encode()

@@ -40,13 +40,6 @@ PICTURE_SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", *RAW_SUFFIXES)
 FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF")  # beside TIFF and raw files
 _AS_THEY_ARE = ("L", "RGB", "I;16", "I;16B", "I;16L", "I;16N")
 _WITH_ALPHA = {"LA": "LA", "La": "LA", "RGBA": "RGBA", "RGBa": "RGBA", "P": "RGBA", "PA": "RGBA"}
-_REFUSED = {
-    "CMYK": "inks (CMYK)",
-    "YCbCr": "luma and chroma (YCbCr)",
-    "LAB": "CIE L*a*b* values",
-    "HSV": "hue and saturation (HSV)",
-    "I": "whole numbers of 32 bits",
-}
 _PNG, _PNG_DEPTH, _PNG_COLOUR = b"\x89PNG\r\n\x1a\n", 24, 25  # places of its header's bytes
 _JPEG_SCAN, _JPEG_END = 0xDA, b"\xff\xd9"
 
@@ -108,21 +101,17 @@ def picture_of(data: bytes, name: str, ignore_alpha: bool = False) -> Picture:
         return tiff_picture(data, name, ignore_alpha)
     try:
         with Image.open(BytesIO(data), formats=FORMATS) as image:
-            return decoded(image, name, ignore_alpha)
+            return decoded(image, name, data, ignore_alpha)
     except UnidentifiedImageError:
         raise InputError(f"{name} is no TIFF, {', '.join(FORMATS)} or damaged: {GIVE}") from None
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise damaged(name, error) from None
 
 
-def decoded(image: Image.Image, name: str, ignore_alpha: bool = False) -> Picture:
-    """The picture of an image that Pillow has opened; else as `read_picture`.
-
-    Colours of 16 bits a channel keep them all if Pillow has not loaded the image yet.
-    """
-    data = _unread_bytes(image)
-    if data.startswith(TIFF_SIGNATURES):
-        return tiff_picture(data, name, ignore_alpha)
+def decoded(
+    image: Image.Image, name: str, data: bytes = b"", ignore_alpha: bool = False
+) -> Picture:
+    """The picture of an image that Pillow has opened, of a file's bytes; else as `read_picture`."""
     frames = getattr(image, "n_frames", 1)
     if frames > 1 and image.format != "MPO":  # a photograph, with previews after it
         raise InputError(f"{name} has {frames} pictures in it: save the one that is meant alone")
@@ -146,18 +135,6 @@ def visible_files(folder: Path, suffixes: Iterable[str] = PICTURE_SUFFIXES) -> l
         for file in folder.iterdir()
         if file.suffix.lower() in allowed and not file.name.startswith(".")
     )
-
-
-def _unread_bytes(image: Image.Image) -> bytes:
-    """The whole file of an image that is not loaded yet, else nothing."""
-    file = getattr(image, "fp", None)
-    if file is None or file.closed or not getattr(image, "tile", None):
-        return b""
-    place = file.tell()
-    file.seek(0)
-    data: bytes = file.read()
-    file.seek(place)
-    return data
 
 
 def _is_whole_jpeg(data: bytes) -> bool:
@@ -194,7 +171,7 @@ def _converted(image: Image.Image, name: str, ignore_alpha: bool) -> Picture:
     if mode == "F":
         return as_light(np.asarray(image), name)
     if mode not in _AS_THEY_ARE:
-        raise InputError(f"{name} has {_REFUSED.get(mode, f'pixels of kind {mode}')}: {GIVE}")
+        raise InputError(f"{name} has pixels of kind {mode}: {GIVE}")
     pixels = np.asarray(image)
     return pixels.astype(pixels.dtype.newbyteorder("="), copy=False)
 

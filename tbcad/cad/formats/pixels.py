@@ -20,18 +20,6 @@ TIFF_SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 # Without loss: none, LZW, deflate (both numbers), PackBits, LZMA, Zstandard.
 _COMPRESSIONS = {1, 5, 8, 32946, 32773, 34925, 50000}
 _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE = 0, 1, 2, 3
-_KINDS = {
-    4: "a mask",
-    5: "inks (CMYK)",
-    6: "luma and chroma (YCbCr)",
-    8: "CIE L*a*b* values",
-    9: "CIE L*a*b* values",
-    10: "CIE L*a*b* values",
-    32803: "a sensor's mosaic (raw)",
-    32844: "LogL values",
-    32845: "LogLuv values",
-    34892: "a camera's own colours (raw)",
-}
 _UNSIGNED, _FLOAT = 1, 3
 _SMALL_OR_MASK = 1 | 4  # NewSubfileType: a preview, a mask
 _UNSPECIFIED = 0  # a further sample that has no part in the colour
@@ -125,7 +113,8 @@ def _check(page: Any, name: str, size: int) -> None:
     check_pixels(name, page.imagewidth, page.imagelength)
     kind = int(page.photometric)
     if kind not in {_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE}:
-        raise InputError(f"{name} has {_KINDS.get(kind, f'pixels of kind {kind}')}: {GIVE}")
+        colours = getattr(page.photometric, "name", kind)
+        raise InputError(f"{name} has pixels of kind {colours}: {GIVE}")
     if int(page.compression) not in _COMPRESSIONS:
         raise InputError(
             f"{name} is compressed as {getattr(page.compression, 'name', page.compression)}: "

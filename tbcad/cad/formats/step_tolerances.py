@@ -6,20 +6,17 @@ Product Manufacturing Information (semantic representation only, no drawn annota
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.GeomAbs import GeomAbs_Plane, GeomAbs_Sphere
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.STEPConstruct import STEPConstruct
 from OCP.TCollection import TCollection_HAsciiString
 from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopoDS import TopoDS
 from OCP.XCAFDimTolObjects import (
     XCAFDimTolObjects_DatumObject,
     XCAFDimTolObjects_DimensionObject,
@@ -37,6 +34,7 @@ from OCP.XCAFDoc import (
 )
 
 from tbcad.cad.formats.step import (
+    ANY_RESULT,
     StepError,
     document_writer,
     finish,
@@ -47,11 +45,23 @@ from tbcad.cad.formats.step import (
 )
 from tbcad.cad.kernel.brep import Solid
 
-Triple: TypeAlias = tuple[float, float, float]
 _KINDS = XCAFDimTolObjects_GeomToleranceType
-PROFILE = _KINDS.XCAFDimTolObjects_GeomToleranceType_ProfileOfSurface
-FLATNESS = _KINDS.XCAFDimTolObjects_GeomToleranceType_Flatness
+ZONES = {
+    "flatness": _KINDS.XCAFDimTolObjects_GeomToleranceType_Flatness,
+    "profile": _KINDS.XCAFDimTolObjects_GeomToleranceType_ProfileOfSurface,
+}
 RADIUS = XCAFDimTolObjects_DimensionType.XCAFDimTolObjects_DimensionType_Size_SphericalRadius
+SAME = 1e-9  # mm: numbers in a file have 15 digits
+
+
+@dataclass(frozen=True)
+class FaceTolerance:
+    """What a face may be off, or each of some faces."""
+
+    kind: str  # "flatness", "profile" (of a surface, in the frame of all datums) or "radius"
+    faces: tuple[str, ...]  # by name
+    value: float  # width of the zone, or what the radius of a sphere may be off, mm
+    radius: float = 0.0  # of the sphere, mm; 0 for zones
 
 
 @dataclass(frozen=True)
@@ -59,12 +69,8 @@ class FaceTolerances:
     """What some faces of a solid may be off."""
 
     datums: Mapping[str, str]  # name ("A" ...) and face, in the order of their precedence
-    flatness: Mapping[str, float]  # of faces, mm
-    profile: Mapping[str, float]  # width of the zone about faces, in the frame of datums, mm
-    radius: Mapping[str, tuple[float, float]]  # of spheres, and what it may be off, mm
+    each: tuple[FaceTolerance, ...]  # zones, then radii
     notes: Mapping[str, str]  # what each is about, and its text
-    # the same for each of some faces that have one zone's width in common, mm
-    common_profile: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
 
 @kernel_settings(schema="AP242DIS")
@@ -89,14 +95,12 @@ def _document(solid: Solid, given: FaceTolerances) -> TDocStd_Document:
     label = {name: shapes.AddSubShape(part, face) for name, face in solid.faces}
     ordered = enumerate(given.datums.items(), 1)
     datums = [_datum(tool, name, label[face], k) for k, (name, face) in ordered]
-    for face, width in given.flatness.items():
-        _tolerance(tool, FLATNESS, width, [label[face]], ())
-    for face, width in given.profile.items():
-        _tolerance(tool, PROFILE, width, [label[face]], datums)
-    for faces, width in given.common_profile.items():
-        _tolerance(tool, PROFILE, width, [label[face] for face in faces], datums)
-    for face, (radius, limit) in given.radius.items():
-        _radius(tool, radius, limit, label[face])
+    for one in given.each:
+        faces = [label[face] for face in one.faces]
+        if one.kind == "radius":
+            _radius(tool, one, *faces)
+        else:
+            _zone(tool, one, faces, datums if one.kind == "profile" else ())
     return document
 
 
@@ -110,31 +114,30 @@ def _datum(tool: XCAFDoc_DimTolTool, name: str, face: TDF_Label, place: int) -> 
     return label
 
 
-def _tolerance(
+def _zone(
     tool: XCAFDoc_DimTolTool,
-    kind: XCAFDimTolObjects_GeomToleranceType,
-    width: float,
+    given: FaceTolerance,
     faces: Sequence[TDF_Label],
     datums: Sequence[TDF_Label],
 ) -> None:
     label = tool.AddGeomTolerance()
     tool.SetGeomTolerance(_sequence(*faces), label)
     tolerance = XCAFDimTolObjects_GeomToleranceObject()
-    tolerance.SetType(kind)
-    tolerance.SetValue(width)
+    tolerance.SetType(ZONES[given.kind])
+    tolerance.SetValue(given.value)
     XCAFDoc_GeomTolerance.Set_s(label).SetObject(tolerance)
     for datum in datums:
         tool.SetDatumToGeomTol(datum, label)
 
 
-def _radius(tool: XCAFDoc_DimTolTool, radius: float, limit: float, face: TDF_Label) -> None:
+def _radius(tool: XCAFDoc_DimTolTool, given: FaceTolerance, face: TDF_Label) -> None:
     label = tool.AddDimension()
     tool.SetDimension(face, label)
     dimension = XCAFDimTolObjects_DimensionObject()
     dimension.SetType(RADIUS)
-    dimension.SetValue(radius)
-    dimension.SetUpperTolValue(limit)
-    dimension.SetLowerTolValue(limit)
+    dimension.SetValue(given.radius)
+    dimension.SetUpperTolValue(given.value)
+    dimension.SetLowerTolValue(given.value)
     XCAFDoc_Dimension.Set_s(label).SetObject(dimension)
 
 
@@ -171,32 +174,52 @@ def _entity(pattern: str, text: str) -> str:
     return found[1]
 
 
-@dataclass(frozen=True)
-class ReadTolerance:
-    """A tolerance or dimension as a reader of the file gets it."""
-
-    kind: str  # "flatness", "profile" or "radius"
-    value: float  # width of the zone, or what the radius may be off, mm
-    centre: Triple | None  # of the sphere that its face is on, mm; None on other faces
-    planes: tuple[tuple[Triple, Triple], ...] = ()  # of its faces, a point (mm) and a unit normal
-    datums: tuple[str, ...] = ()  # names of the datums of its frame, in their order
-    nominal: float = 0.0  # radius, mm; 0 for tolerances
+Framed: TypeAlias = tuple[FaceTolerance, tuple[str, ...]]
+"""A tolerance, and the names of the datums of its frame in their order."""
+FacesOf: TypeAlias = Callable[[TDF_Label], tuple[str, ...]]
 
 
-def read_tolerances(path: Path) -> list[ReadTolerance]:
-    """All tolerances and dimensions of a file, as the kernel reads them; StepError if it cannot."""
+def check_read_back(path: Path, given: FaceTolerances) -> None:
+    """Compare all zones and radii in a file, and the frames of zones, with what they should be.
+
+    StepError if one is missing, doubled, or not as given: a fault of tbcad.
+    """
+    frame, read = tuple(given.datums), read_tolerances(path)
+    meant = {_key(one): one for one in given.each}
+    if sorted(map(_key, meant.values())) != sorted(_key(one) for one, _ in read):
+        raise StepError(f"{path.name}: {len(read)} tolerances are not those {len(meant)} given")
+    for one, datums in read:
+        wanted = meant[_key(one)]
+        off = max(abs(one.value - wanted.value), abs(one.radius - wanted.radius))
+        if off > SAME or datums != (frame if one.kind == "profile" else ()):
+            raise StepError(f"{path.name}: {one.kind} of {one.faces[0]} is read otherwise")
+
+
+def _key(one: FaceTolerance) -> tuple[str, tuple[str, ...]]:
+    return one.kind, tuple(sorted(one.faces))
+
+
+def read_tolerances(path: Path) -> list[Framed]:
+    """All tolerances and radii of a file, as the kernel reads them; StepError if it cannot."""
     document = new_document()
     reader = STEPCAFControl_Reader()
     reader.SetGDTMode(True)
     if reader.ReadFile(str(path)) != IFSelect_RetDone or not reader.Transfer(document):
         raise StepError(f"{path.name}: the kernel cannot read its own file")
     tool = XCAFDoc_DocumentTool.DimTolTool_s(document.Main())
-    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    return [*_read_zones(tool, shapes), *_read_radii(tool, shapes)]
+    entity_of = reader.Reader().WS().TransferReader().EntityFromShapeResult
+
+    def faces(label: TDF_Label) -> tuple[str, ...]:
+        first, second = TDF_LabelSequence(), TDF_LabelSequence()
+        tool.GetRefShapeLabel_s(label, first, second)
+        shapes = map(XCAFDoc_ShapeTool.GetShape_s, _each(first))
+        return tuple(entity_of(one, ANY_RESULT).Name().ToCString() for one in shapes)
+
+    return [*_read_zones(tool, faces), *_read_radii(tool, faces)]
 
 
-def _read_zones(tool: XCAFDoc_DimTolTool, shapes: XCAFDoc_ShapeTool) -> Iterator[ReadTolerance]:
-    names = {FLATNESS: "flatness", PROFILE: "profile"}
+def _read_zones(tool: XCAFDoc_DimTolTool, faces: FacesOf) -> Iterator[Framed]:
+    names = {kind: name for name, kind in ZONES.items()}
     labels = TDF_LabelSequence()
     tool.GetGeomToleranceLabels(labels)
     for label in _each(labels):
@@ -206,30 +229,16 @@ def _read_zones(tool: XCAFDoc_DimTolTool, shapes: XCAFDoc_ShapeTool) -> Iterator
         datums = [XCAFDoc_Datum.Set_s(one).GetObject() for one in _each(referred)]
         ordered = sorted(datums, key=lambda one: one.GetPosition())
         frame = tuple(one.GetName().ToCString() for one in ordered)
-        centre, planes = _centre_and_planes(tool, shapes, label)
-        yield ReadTolerance(names[zone.GetType()], zone.GetValue(), centre, planes, frame)
+        yield FaceTolerance(names[zone.GetType()], faces(label), zone.GetValue()), frame
 
 
-def _read_radii(tool: XCAFDoc_DimTolTool, shapes: XCAFDoc_ShapeTool) -> Iterator[ReadTolerance]:
+def _read_radii(tool: XCAFDoc_DimTolTool, faces: FacesOf) -> Iterator[Framed]:
     labels = TDF_LabelSequence()
     tool.GetDimensionLabels(labels)
     for label in _each(labels):
         size = XCAFDoc_Dimension.Set_s(label).GetObject()
-        centre, _ = _centre_and_planes(tool, shapes, label)
-        yield ReadTolerance("radius", size.GetUpperTolValue(), centre, nominal=size.GetValue())
-
-
-def _centre_and_planes(
-    tool: XCAFDoc_DimTolTool, shapes: XCAFDoc_ShapeTool, label: TDF_Label
-) -> tuple[Triple | None, tuple[tuple[Triple, Triple], ...]]:
-    first, second = TDF_LabelSequence(), TDF_LabelSequence()
-    tool.GetRefShapeLabel_s(label, first, second)
-    faces = [TopoDS.Face_s(shapes.GetShape_s(one)) for one in _each(first)]
-    surfaces = [BRepAdaptor_Surface(face) for face in faces]
-    if len(surfaces) == 1 and surfaces[0].GetType() == GeomAbs_Sphere:
-        return surfaces[0].Sphere().Location().Coord(), ()
-    flat = [one.Plane() for one in surfaces if one.GetType() == GeomAbs_Plane]
-    return None, tuple((one.Location().Coord(), one.Axis().Direction().Coord()) for one in flat)
+        limit = size.GetUpperTolValue()
+        yield FaceTolerance("radius", faces(label), limit, size.GetValue()), ()
 
 
 def _each(labels: TDF_LabelSequence) -> Iterator[TDF_Label]:

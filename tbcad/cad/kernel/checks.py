@@ -20,6 +20,7 @@ from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import meshed, welded
 from tbcad.cad.kernel.solids import faces, one_solid, vertices, without_cavities
 from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.cells import FaceIntegrals
 from tbcad.types import Floats
 
 NEAR_MM = 1e-4
@@ -63,29 +64,10 @@ def properties(shape: TopoDS_Shape) -> SolidProperties:
     return SolidProperties(inside.Mass(), surface.Mass(), (centre.X(), centre.Y(), centre.Z()))
 
 
-@dataclass(frozen=True)
-class FaceIntegrals:
-    """Integrals over faces, by which they add up to those of a solid."""
-
-    origin: Floats  # any point near the faces, mm, (3,): errors grow with its distance
-    volume: float  # between the origin and the faces, mm^3
-    volume_moment: Floats  # of the distance from the origin over that volume, mm^4, (3,)
-    area: float  # mm^2
-
-    def __add__(self, other: "FaceIntegrals") -> "FaceIntegrals":
-        """Those of both together; they have the same origin."""
-        return FaceIntegrals(
-            self.origin,
-            self.volume + other.volume,
-            self.volume_moment + other.volume_moment,
-            self.area + other.area,
-        )
-
-    @property
-    def properties(self) -> SolidProperties:
-        """Those of the solid that the faces close."""
-        x, y, z = (self.origin + self.volume_moment / self.volume).tolist()
-        return SolidProperties(self.volume, self.area, (x, y, z))
+def properties_within(faces: FaceIntegrals) -> SolidProperties:
+    """Those of the solid that all its faces close."""
+    x, y, z = (faces.origin + faces.volume_moment / faces.volume).tolist()
+    return SolidProperties(faces.volume, faces.area, (x, y, z))
 
 
 def mean_corner(shape: TopoDS_Shape) -> Floats:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import trimesh
 from OCP.Bnd import Bnd_Box
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
@@ -17,10 +18,9 @@ from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
-from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import meshed
 from tbcad.cad.kernel.solids import faces
-from tbcad.types import Bools, Floats
+from tbcad.types import Floats
 
 SAME_MM, SAME_COS = 1e-3, 1e-6
 HOLE_DEG, SLOT_DEG = 200.0, 150.0  # least angles of the wall of a hole, and of the end of a slot
@@ -29,7 +29,7 @@ FULL_DEG = 360.0
 PLANE_COS = 1 - 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RoundFace:
     """Cylindrical faces on one axis, with one radius."""
 
@@ -50,18 +50,6 @@ class RoundFace:
     def length(self) -> float:
         """Along the axis, mm."""
         return float(np.linalg.norm(self.end - self.start))
-
-
-@dataclass(frozen=True, eq=False)
-class _Wall:
-    """A cylindrical face: its axis by a point and a direction, and its reach along and round it."""
-
-    point: Floats
-    direction: Floats
-    radius: float
-    reach: tuple[float, float]
-    turn_deg: float
-    hollow: bool
 
 
 def bounds(shape: TopoDS_Shape) -> Floats:
@@ -92,24 +80,12 @@ def cylinders(shape: TopoDS_Shape) -> list[RoundFace]:
         reach = np.array([PROBE_MM * found[k].axis for k in holes])
         ends = np.array([[found[k].start, found[k].end] for k in holes])
         beyond = ends + np.stack([-reach, reach], axis=1)
-        is_open = ~_inside(meshed(shape, MESH_MM), beyond.reshape(-1, 3)).reshape(-1, 2)
+        mesh = meshed(shape, MESH_MM)
+        whole = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
+        is_open = ~whole.contains(beyond.reshape(-1, 3)).reshape(-1, 2)
         for k, (start, end) in zip(holes, is_open.tolist(), strict=True):
             found[k] = replace(found[k], open_start=start, open_end=end)
     return found
-
-
-def _inside(mesh: Mesh, points: Floats) -> Bools:
-    """Whether points are inside a closed mesh, by solid angles (van Oosterom, Strackee, 1983)."""
-    inside = []
-    for point in points:
-        corner = mesh.vertices[mesh.triangles] - point
-        a, b, c = corner[:, 0], corner[:, 1], corner[:, 2]
-        na, nb, nc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-        up = np.einsum("ij,ij->i", a, np.cross(b, c))
-        ab, bc, ca = (np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a)))
-        down = na * nb * nc + ab * nc + bc * na + ca * nb
-        inside.append(abs(2 * np.arctan2(up, down).sum()) > 2 * np.pi)
-    return np.array(inside)
 
 
 def plane_levels(shape: TopoDS_Shape, direction: Floats) -> list[tuple[float, float]]:
@@ -134,28 +110,27 @@ def _area(face: TopoDS_Face) -> float:
     return float(found.Mass())
 
 
-def _wall(face: TopoDS_Face) -> _Wall | None:
+def _wall(face: TopoDS_Face) -> RoundFace | None:
+    """A cylindrical face; its ends are not looked at."""
     surface = BRepAdaptor_Surface(face)
     if surface.GetType() != GeomAbs_Cylinder:
         return None
     cylinder = surface.Cylinder()
-    u_low, u_high, low, high = BRepTools.UVBounds_s(face)
+    u_low, u_high, *reach = BRepTools.UVBounds_s(face)
+    point = np.array(cylinder.Location().Coord())
     direction = np.array(cylinder.Axis().Direction().Coord())
+    start, end = (point + at * direction for at in reach)
+    if tuple(np.round(direction, 6)) < (0, 0, 0):
+        start, end = end, start
     # Outward of the surface is away from the axis where its axes are right-handed.
     outward = cylinder.Direct() == (face.Orientation() != TopAbs_REVERSED)
-    return _Wall(
-        point=np.array(cylinder.Location().Coord()),
-        direction=direction,
-        radius=cylinder.Radius(),
-        reach=(low, high),
-        turn_deg=float(np.degrees(u_high - u_low)),
-        hollow=not outward,
-    )
+    turn = float(np.degrees(u_high - u_low))
+    return RoundFace(start, end, cylinder.Radius(), turn, hollow=not outward)
 
 
-def _groups(walls: Iterable[_Wall]) -> list[list[_Wall]]:
+def _groups(walls: Iterable[RoundFace]) -> list[list[RoundFace]]:
     """Walls on one axis with one radius whose reaches meet."""
-    groups: list[list[_Wall]] = []
+    groups: list[list[RoundFace]] = []
     for wall in walls:
         near = [group for group in groups if any(_meet(wall, one) for one in group)]
         joined = [wall, *(one for group in near for one in group)]
@@ -163,31 +138,27 @@ def _groups(walls: Iterable[_Wall]) -> list[list[_Wall]]:
     return groups
 
 
-def _meet(one: _Wall, other: _Wall) -> bool:
+def _meet(one: RoundFace, other: RoundFace) -> bool:
     if one.hollow != other.hollow or abs(one.radius - other.radius) > SAME_MM:
         return False
-    if abs(one.direction @ other.direction) < 1 - SAME_COS:
+    if abs(one.axis @ other.axis) < 1 - SAME_COS:
         return False
-    between = other.point - one.point
-    if np.linalg.norm(np.cross(between, one.direction)) > SAME_MM:
+    if np.linalg.norm(np.cross(other.start - one.start, one.axis)) > SAME_MM:
         return False
-    low, high = _reach(other, one.point, one.direction)
-    return low <= one.reach[1] + SAME_MM and high >= one.reach[0] - SAME_MM
+    low, high = _reach(other, one)
+    return low <= one.length + SAME_MM and high >= -SAME_MM
 
 
-def _reach(wall: _Wall, point: Floats, direction: Floats) -> tuple[float, float]:
-    """Reach of a wall along an axis that is its own, from a point of it."""
-    ends = sorted(
-        float((wall.point + at * wall.direction - point) @ direction) for at in wall.reach
-    )
+def _reach(wall: RoundFace, first: RoundFace) -> tuple[float, float]:
+    """Reach of a wall along the axis of another, from the start of that."""
+    ends = sorted(float((end - first.start) @ first.axis) for end in (wall.start, wall.end))
     return ends[0], ends[1]
 
 
-def _joined(group: Sequence[_Wall]) -> RoundFace:
+def _joined(group: Sequence[RoundFace]) -> RoundFace:
     first = group[0]
-    direction = first.direction * (-1.0 if tuple(np.round(first.direction, 6)) < (0, 0, 0) else 1.0)
-    reaches = [_reach(wall, first.point, direction) for wall in group]
+    reaches = [_reach(wall, first) for wall in group]
     low, high = min(one[0] for one in reaches), max(one[1] for one in reaches)
-    areas = sum((wall.reach[1] - wall.reach[0]) * wall.turn_deg for wall in group)
-    start, end = first.point + low * direction, first.point + high * direction
-    return RoundFace(start, end, first.radius, min(areas / (high - low), FULL_DEG), first.hollow)
+    turn = sum(wall.length * wall.turn_deg for wall in group) / (high - low)
+    start, end = first.start + low * first.axis, first.start + high * first.axis
+    return replace(first, start=start, end=end, turn_deg=min(turn, FULL_DEG))

@@ -1,15 +1,13 @@
 """The mirrors of both cameras: directions, poses, radii and cells, from the spec."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import FLIP_X
-from tbcad.core.mirrors.clearance import closest_passage, passing_distances
+from tbcad.core.mirrors.clearance import closest_passage
 from tbcad.core.mirrors.radii import (
     RadiusProblem,
     half_angles,
@@ -26,14 +24,12 @@ from tbcad.core.optics.power_diagram import NotRegularError, bounded_triangulati
 from tbcad.core.optics.surfaces import Surfaces, planes
 from tbcad.core.spec.design import FIT, MAX_HFOV, CameraSpec, MirrorsSpec, Spec
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.sizes import MAX_SEMI_MINOR, OpticsSpec
 from tbcad.types import Bools, Floats, Ints, Progress
 
 DIRECTION_DIGITS = 9  # directions that differ by less than rounding have equal heights or azimuths
 HFOV_DIGITS = 12
 UNSTRETCHED = (1.0, 1.0)
-TRIES = 5  # sizes are tried until one clears: the first that is computed mostly does
-STEPS_PER_MM = 10  # of the sizes tried
+STEPS_PER_MM = 10  # of a size that an error names
 
 
 def mirror_ids(camera_id: str, mirrors: int) -> list[str]:
@@ -255,86 +251,17 @@ def _cells_under_coat(cells: Cells, coating: float) -> Cells:
 def _check_clearance(spec: Spec, array: MirrorArray) -> None:
     """Refuse a design whose object stands between its mirrors and the camera.
 
-    SpecError names the mirror, and sizes with which the light passes the object.
+    SpecError names the mirror, and a capture sphere that the light passes. Of a smaller sphere less
+    light is in use, so that none passes closer than now.
     """
-    radius = spec.optics.capture_diameter_mm / 2
-    distance, mirror = _passage(spec.optics, array)
-    if distance >= radius:
+    diameter = spec.optics.capture_diameter_mm
+    distance, mirror = closest_passage(array.cells, array.ellipsoid.pinhole, diameter / 2)
+    if distance >= diameter / 2:
         return
     raise SpecError(
         f"the object stands in its own light: on the way from mirror {array.ids[mirror]} to the "
         f"camera light passes {distance:.4g} mm from the object's centre, closer than the capture "
-        f"sphere's radius of {radius:.4g} mm: {_remedies(spec, array)}"
+        f"sphere's radius of {diameter / 2:.4g} mm: make optics.capture_diameter_mm "
+        f"{math.floor(2 * distance * STEPS_PER_MM) / STEPS_PER_MM:g} or less, make "
+        "optics.semi_minor_mm larger, or bring optics.camera_mm farther away"
     )
-
-
-def _remedies(spec: Spec, array: MirrorArray) -> str:
-    sizes = (
-        ("capture_diameter_mm", _smaller_sphere, "less"),
-        ("semi_minor_mm", _wider_ellipsoid, "more"),
-    )
-    tried = [
-        f"optics.{key} {value:g} or {which}"
-        for key, size, which in sizes
-        if (value := _size_that_clears(spec, array, key, size))
-    ]
-    if not tried:
-        return "make optics.capture_diameter_mm smaller or bring optics.camera_mm farther away"
-    return f"make {', or '.join(tried)} ({'both ' if len(tried) > 1 else ''}tried)"
-
-
-def _size_that_clears(
-    spec: Spec,
-    array: MirrorArray,
-    key: str,
-    size: Callable[[OpticsSpec, MirrorArray, float], float | None],
-) -> float | None:
-    """The size nearest to the spec's that was tried and clears, mm; None where none was found."""
-    tried = spec
-    for _ in range(TRIES):
-        value = size(spec.optics, array, _spread(tried.optics, array))
-        if value is None:
-            return None
-        tried = spec.model_copy(update={"optics": spec.optics.model_copy(update={key: value})})
-        try:
-            array = _half_a(tried)
-        except SpecError:
-            return None
-        if _passage(tried.optics, array)[0] >= tried.optics.capture_diameter_mm / 2:
-            return value
-    return None
-
-
-def _passage(optics: OpticsSpec, array: MirrorArray) -> tuple[float, int]:
-    return closest_passage(array.cells, array.ellipsoid.pinhole, optics.capture_diameter_mm / 2)
-
-
-def _apex_passage(ellipsoid: Ellipsoid, u: Floats) -> float:
-    """Smallest distance from the origin of the ways between the camera and all apices, mm."""
-    return float(passing_distances(ellipsoid.pinhole, ellipsoid.apices(u)).min())
-
-
-def _spread(optics: OpticsSpec, array: MirrorArray) -> float:
-    """How much closer light in use passes than that of the apices, a mm of capture diameter.
-
-    It hardly depends on the sizes, so a size that clears follows from the apices in closed form.
-    """
-    apices = _apex_passage(array.ellipsoid, array.u)
-    return (apices - _passage(optics, array)[0]) / optics.capture_diameter_mm
-
-
-def _smaller_sphere(_: OpticsSpec, array: MirrorArray, spread: float) -> float | None:
-    diameter = _apex_passage(array.ellipsoid, array.u) / (0.5 + spread)
-    return math.floor(diameter * STEPS_PER_MM) / STEPS_PER_MM or None
-
-
-def _wider_ellipsoid(optics: OpticsSpec, array: MirrorArray, spread: float) -> float | None:
-    needed = optics.capture_diameter_mm * (0.5 + spread)
-
-    def spare(semi_minor: float) -> float:
-        return _apex_passage(Ellipsoid(array.ellipsoid.pinhole, semi_minor), array.u) - needed
-
-    if not spare(optics.semi_minor_mm) < 0 <= spare(MAX_SEMI_MINOR):
-        return None
-    semi_minor = brentq(spare, optics.semi_minor_mm, MAX_SEMI_MINOR)
-    return math.ceil(semi_minor * STEPS_PER_MM) / STEPS_PER_MM

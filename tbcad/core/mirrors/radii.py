@@ -3,7 +3,6 @@
 First flat mirrors, and the paper's paraxial radii that widen their field (section 3.2).
 """
 
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,7 +27,6 @@ MAX_ITERATIONS = 400
 MAX_STALLED = 40  # of them in which the least error so far does not fall
 # Designs that settle need none; each costs as much as a step, and further ones have never helped.
 MAX_HALVINGS = 4
-GROOVE_HALVINGS = 5  # how often a groove that is too wide is halved in search of one that is not
 NAMED_MIRRORS = 5  # mirrors that an error names at most
 
 
@@ -110,27 +108,13 @@ class RadiusProblem:
         try:
             return pedestal_cells(self.plan, mirrors)
         except NotRegularError as error:
-            raise SpecError(f"{error}: {self._narrower_groove()}") from None
+            raise SpecError(f"{error}: make shell.groove_mm or optics.n smaller") from None
 
     @cached_property
     def plan(self) -> PedestalPlan:
         """Of pedestals, which depends neither on curvatures nor on aims."""
-        return self._plan(self.groove or 0.0)
-
-    def _plan(self, groove: float) -> PedestalPlan:
         surfaces = self.mirrors.joined(self.planes)
-        return pedestal_plan(surfaces, self.triangles, self.pinhole, groove)
-
-    def _narrower_groove(self) -> str:
-        """What to set so that mirrors on pedestals have room; it was tried with the paper's."""
-        mirrors = self.mirrors.with_curvature(self.paper_curvature)
-        for narrower in (self.groove or 0.0) * 0.5 ** np.arange(1, GROOVE_HALVINGS):
-            with suppress(NotRegularError):
-                pedestal_cells(self._plan(narrower), mirrors)
-                return (
-                    f"set shell.groove_mm to {narrower:g}, which was tried with mirrors like these"
-                )
-        return "make optics.n smaller"
+        return pedestal_plan(surfaces, self.triangles, self.pinhole, self.groove or 0.0)
 
     def coverage(self, cells: Cells) -> Floats:
         """Coverage diameter of each mirror's virtual camera, mm, (m,).

@@ -240,35 +240,30 @@ def _turning_angles(cells: Cells, mirror: Ints, points: Floats, offsets: Ints) -
 
 
 @dataclass(frozen=True)
-class CellMoments:
-    """Integrals over m cells on spheres, with n the unit normal away from the sphere's centre."""
+class FaceIntegrals:
+    """Integrals over faces, by which they add up to those of a solid."""
 
-    centre: Floats  # of the sphere from the origin, mm, (m, 3)
-    radius: Floats  # mm, (m,)
-    area: Floats  # integral of 1, mm^2, (m,)
-    first: Floats  # integral of n, mm^2, (m, 3)
-    second: Floats  # integral of n n^T, mm^2, (m, 3, 3)
+    origin: Floats  # any point near the faces, mm, (3,): errors grow with its distance
+    volume: float  # between the origin and the faces, mm^3
+    volume_moment: Floats  # of the distance from the origin over that volume, mm^4, (3,)
+    area: float  # mm^2
 
-    @property
-    def volume(self) -> float:
-        """Between the origin and all cells, mm^3: a third of the integral of x.n."""
-        return float((self._heights + self.radius * self.area).sum()) / 3
-
-    @property
-    def volume_moment(self) -> Floats:
-        """Integral of x over that volume, mm^4, (3,): a quarter of the integral of x (x.n)."""
-        radius = self.radius[:, None]
-        around = np.einsum("mij,mj->mi", self.second, self.centre) + radius * self.first
-        along = (self._heights + self.radius * self.area)[:, None] * self.centre
-        return np.asarray((along + radius * around).sum(axis=0)) / 4
-
-    @property
-    def _heights(self) -> Floats:
-        return np.asarray(np.einsum("mi,mi->m", self.centre, self.first))
+    def __add__(self, other: "FaceIntegrals") -> "FaceIntegrals":
+        """Those of both together; they have the same origin."""
+        return FaceIntegrals(
+            self.origin,
+            self.volume + other.volume,
+            self.volume_moment + other.volume_moment,
+            self.area + other.area,
+        )
 
 
-def cell_moments(cells: Cells, origin: Floats) -> CellMoments:
-    """Moments of the cells of mirrors that are all spherical, about an origin (3,), mm."""
+def cell_integrals(cells: Cells, origin: Floats) -> FaceIntegrals:
+    """Integrals over the cells of mirrors that are all spherical, with an origin (3,), mm.
+
+    By those of 1, n and n n^T over each cell, with n the unit normal away from the sphere's centre:
+    the volume is a third of the integral of x.n, its moment a quarter of that of x (x.n).
+    """
     m = cells.mirrors
     mirrors, arcs = cells.mirror_surfaces, cells.arcs
     radius = mirrors.radius
@@ -281,9 +276,12 @@ def cell_moments(cells: Cells, origin: Floats) -> CellMoments:
         n, turning = _along(arcs, mine, centre[of], radius[of])
         np.add.at(first, of, sign * turning.sum(axis=1) / 2)
         np.add.at(second, of, sign * np.einsum("eki,ekj->eij", n, turning))
-    square = radius[:, None] ** 2
-    second = (area[:, None, None] * np.eye(3) + square[:, None] * second) / 3
-    return CellMoments(centre - origin, radius, area, square * first, second)
+    centre, square, size = centre - origin, radius[:, None] ** 2, radius[:, None]
+    first, second = square * first, (area[:, None, None] * np.eye(3) + square[:, None] * second) / 3
+    cones = np.einsum("mi,mi->m", centre, first) + radius * area
+    around = np.einsum("mij,mj->mi", second, centre) + size * first
+    moment = (cones[:, None] * centre + size * around).sum(axis=0) / 4
+    return FaceIntegrals(origin, float(cones.sum()) / 3, moment, float(area.sum()))
 
 
 def _along(arcs: Arcs, arc: Ints, centre: Floats, radius: Floats) -> tuple[Floats, Floats]:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 from pydantic import BeforeValidator, Field, model_validator
 
 from tbcad.core.spec.prototype import PrototypeSpec
-from tbcad.core.spec.section import OrWord, Section, as_tuple
+from tbcad.core.spec.section import OrWord, Section, as_tuple, whole
 from tbcad.core.spec.sizes import OpticsSpec, with_sizes
 
 _Side: TypeAlias = Annotated[float, Field(ge=20, le=2000)]
@@ -36,17 +36,6 @@ class PrinterSpec(Section):
     """Width of the bed's border that stays free, also below the printer's full height."""
     density_g_cm3: float = Field(1.27, gt=0, le=20)
     """Density of the printed material (PETG 1.27, PLA 1.24, PA12 1.01)."""
-
-
-def _current(value: object) -> object:
-    if type(value) is not int:  # 2.0 equals 2, so Literal[2] would take it
-        raise ValueError("allowed is the whole number 2: change it")
-    if value == 1:
-        raise ValueError(
-            "1 is the version before the section [printer]: move bed_mm, bed_margin_mm and "
-            "density_g_cm3 from [prototype.base] to [printer] if they are set, and set schema to 2"
-        )
-    return value
 
 
 class CameraSpec(Section):
@@ -179,7 +168,7 @@ class Spec(Section):
 
     name: str = Field("turtleback", pattern="^[A-Za-z0-9][A-Za-z0-9 ._-]{0,79}$")
     """Name of the design, for file headers and reports."""
-    schema_version: Annotated[Literal[2], BeforeValidator(_current)] = Field(2, alias="schema")
+    schema_version: Annotated[Literal[2], BeforeValidator(whole)] = Field(2, alias="schema")
     """Version of this table's keys."""
     optics: OpticsSpec = OpticsSpec()
     camera: CameraSpec = CameraSpec()

@@ -1,6 +1,5 @@
 """The section [prototype] of the design: steel balls on a base that turns, and its sections."""
 
-from collections.abc import Callable
 from typing import Annotated, Literal, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field
@@ -39,27 +38,7 @@ _Coordinate: TypeAlias = Annotated[float, Field(ge=-1000, le=1000)]
 _Place: TypeAlias = Annotated[
     tuple[_Coordinate, _Coordinate, _Coordinate], BeforeValidator(as_tuple)
 ]
-_Count: TypeAlias = Annotated[int, Field(ge=1, le=MOST_BALLS)]
-
-
-def _count(value: object) -> object:
-    if value == "auto" or (type(value) is int and 1 <= value <= MOST_BALLS):
-        return value
-    raise ValueError(
-        f"{short_text(value)} is not allowed: give a whole number from 1 to {MOST_BALLS}, or auto"
-    )
-
-
-def _names(example: str) -> Callable[[object], object]:
-    """A check that a value is a list of names; the example is for the error."""
-
-    def check(value: object) -> object:
-        names = as_tuple(value)
-        if isinstance(names, tuple) and names and all(isinstance(name, str) for name in names):
-            return names
-        raise ValueError(f"{short_text(value)} is not allowed: give a list such as {example}")
-
-    return check
+Names: TypeAlias = Annotated[tuple[str, ...], Field(min_length=1), BeforeValidator(as_tuple)]
 
 
 def _places(value: object) -> object:
@@ -287,7 +266,7 @@ class FrameSpec(Section):
 class PrototypeSpec(Section):
     """The prototype: balls that stand in for mirrors, and the base that carries them."""
 
-    k: Annotated[_Count | Literal["auto"], BeforeValidator(_count)] = "auto"
+    k: Annotated[int, OR_AUTO] = Field(AUTO, ge=1, le=MOST_BALLS)
     """Number of balls, or auto: the smallest number within the limits below that has room."""
     radius_weight_deg: float = Field(0.25, ge=0, le=100)
     """Weight of the radius against the polar angle when mirrors are grouped, degrees per mm.
@@ -300,15 +279,10 @@ class PrototypeSpec(Section):
     less than at n = 18."""
     auto_lost_percent: float = Field(25.0, ge=0, le=100)
     """With k auto: largest share of the shell's pixels that the balls lose."""
-    catalogues: Annotated[tuple[str, ...], BeforeValidator(_names('["metric", "my.csv"]'))] = (
-        "metric",
-        "inch",
-    )
+    catalogues: Names = ("metric", "inch")
     """Lists of balls on sale: metric, inch, or CSV files (as seen from the folder tbcad runs
     in) with the columns size,diameter_mm,standard,grades,mass_g,source."""
-    prices: Annotated[
-        tuple[str, ...], BeforeValidator(_names('["my_prices.csv", "estimates"]'))
-    ] = ("estimates",)
+    prices: Names = ("estimates",)
     """Lists of prices: estimates, or CSV files (as seen from the folder tbcad runs in) with the
     columns part,each,per_kg,currency,date,source; the first list and line that fits a part
     counts."""

@@ -55,6 +55,13 @@ AUTO: Final[Any] = "auto"  # value of a key whose value tbcad chooses
 OR_AUTO = OrWord(AUTO)
 
 
+def whole(value: object) -> object:
+    """A whole number as it is: a literal 1 would take 1.0 and true, which equal it."""
+    if type(value) is not int:
+        raise ValueError("allowed is a whole number: change it")
+    return value
+
+
 def as_tuple(value: object) -> object:
     """A list as a tuple, which can be frozen; anything else as it is."""
     return tuple(value) if isinstance(value, list) else value

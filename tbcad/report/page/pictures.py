@@ -93,17 +93,23 @@ def _read(path: Path) -> Picture | None:
             warnings.simplefilter("error")  # of a picture that is far too large
             with Image.open(path, formats=("PNG", "JPEG")) as image:
                 image.draft("RGB", (MAX_SIDE_PX, MAX_SIDE_PX))
-                return _jpeg(path.name, np.asarray(_on_white(image)), MAX_SIDE_PX)
-    except (InputError, OSError, ValueError, SyntaxError, Warning, Image.DecompressionBombError):
+                return _jpeg(path.name, _in_8_bits(_on_white(image)), MAX_SIDE_PX)
+    except (OSError, ValueError, SyntaxError, Warning, Image.DecompressionBombError):
         return None
 
 
+def _in_8_bits(image: Any) -> Bytes:
+    """Grey (h, w) or red, green, blue (h, w, 3)."""
+    if image.mode.startswith("I;16"):
+        return np.asarray(np.asarray(image) >> 8, np.uint8)
+    return np.asarray(image.convert("L" if image.mode in {"1", "L"} else "RGB"))
+
+
 def _on_white(image: Any) -> Any:
-    """Red, green and blue of 8 bits each; ValueError: it has more."""
     from PIL import Image
 
-    if image.mode.startswith(("I", "F")):
-        raise ValueError(image.mode)
+    if "A" not in image.getbands() and "transparency" not in image.info:
+        return image
     drawn = image.convert("RGBA")
     return Image.alpha_composite(Image.new("RGBA", drawn.size, "white"), drawn).convert("RGB")
 

@@ -68,14 +68,6 @@ class CoverageResult(CameraCoverage):
 
 
 @dataclass(frozen=True)
-class ShellResult(CoverageResult):
-    """Coverage and pointing errors in s builds of the shell."""
-
-    pixels: Floats  # sizes of the pictures, (s, v)
-    angle: Floats  # pointing errors of an uncalibrated build, radians, (s, 2 m)
-
-
-@dataclass(frozen=True)
 class YieldEstimate:
     """Share of builds whose every virtual camera covers enough."""
 
@@ -106,16 +98,11 @@ class ShellCase:
 class MonteCarloCase(ShellCase):
     """Simulates builds of the shell."""
 
-    def __call__(self, builds: range) -> ShellResult:
+    def __call__(self, builds: range) -> CoverageResult:
         """Result of the builds of these numbers."""
         draws = self.draws(builds)
-        diameter, pixels = coverage(self.edge_models, draws)
-        rays = [
-            pointing(edge_model, drawn)
-            for edge_model, drawn in zip(self.edge_models, draws, strict=True)
-        ]
-        angle, offset = (np.concatenate(errors, axis=1) for errors in zip(*rays, strict=True))
-        return ShellResult(diameter, offset, pixels, angle)
+        offsets = list(map(pointing, self.edge_models, draws))
+        return CoverageResult(coverage(self.edge_models, draws), np.concatenate(offsets, axis=1))
 
 
 @dataclass(frozen=True)
@@ -126,7 +113,7 @@ class CoverageCase(ShellCase):
 
     def __call__(self, builds: range) -> CameraCoverage:
         """Result of the builds of these numbers."""
-        return CameraCoverage(coverage(self.edge_models, self.draws(builds), self.worst_only)[0])
+        return CameraCoverage(coverage(self.edge_models, self.draws(builds), self.worst_only))
 
 
 def simulate(

@@ -26,7 +26,6 @@ from tbcad.tolerancing.montecarlo.edge_samples import (
     least_sample,
     lower_bound,
     parabola_minimum,
-    picture_area,
     reflect_samples,
     sample_points,
     screen_crossings,
@@ -51,7 +50,7 @@ ROUNDS = 4
 BOTH = -1
 
 # Columns of the result.
-MISS_SQUARED, CROSSINGS, AREA = 0, 1, 2
+MISS_SQUARED, CROSSINGS = 0, 1
 # Columns of a part of an edge: the edge, its mirror, the other face, the parameters between which
 # the minimum is, the minimum sample, and what the minimum is not below.
 EDGE, MIRROR, OTHER, LOW, HIGH, LEAST, BOUND, COLUMNS = 0, 10, 11, 12, 13, 14, 15, 16
@@ -77,21 +76,20 @@ def trace_cell_edges(
             of none where no mirror has any.
         pairs: see tbcad.tolerancing.montecarlo.edge_model.
         halved: mirrors whose seam edge does not limit their coverage, (m,).
-        view: pinhole, object's centre, scale, the camera's axes right, down, forward, in the
-            frame of the shell, and the radius of the valleys' fillets, (7, 3).
+        view: pinhole, object's centre, scale, in the frame of the shell, and the radius of the
+            valleys' fillets, (4, 3).
         screen: for each mirror two axes and the normal of a plane through the object, (m, 3, 3).
         worst_only: of the minima only that of all mirrors is exact, the others are not below
-            theirs; and no areas.
+            theirs.
 
     Returns:
-        For each mirror (m, 3): the minimum distance squared of its rays from the object's centre,
-        inf without an edge; how often the outline's image crosses the first axis of its screen;
-        and the area of the cell's picture at unit distance.
+        For each mirror (m, 2): the minimum distance squared of its rays from the object's centre,
+        inf without an edge, and how often the outline's image crosses the first axis of its screen.
     """
     pair, offset, face, reach = pairs
     formed, rounded = len(forms) > 0, view[VALLEY, 0] > 0
     centres = surfaces.copy() if rounded else surfaces
-    result = np.zeros((len(halved), 3))
+    result = np.zeros((len(halved), 2))
     parts, count, samples = np.empty((len(pair), COLUMNS)), 0, np.empty(PLACES)
     edge, spans, spare = np.empty(EDGE_COLUMNS), np.empty((INTERVALS, 2)), np.empty((INTERVALS, 2))
     for e in range(len(pair)):
@@ -111,16 +109,12 @@ def trace_cell_edges(
                 low, high = spans[s]
                 sample_points(edge, low, high, view, samples)
                 _touch(surfaces, own, view, samples)
-                area = 0.0 if worst_only else picture_area(view, samples)
                 if formed:
                     _count_crossings(surfaces, halved, view, screen, (p, q), own, samples, result)
                     displace_samples(view, surfaces, forms, (p, q), samples)
                     _touch(surfaces, own, view, samples)
-                for i, other, sign in ((p, q, 1), (q, p, -1)):
-                    if i >= len(result) or own not in (BOTH, i):
-                        continue
-                    result[i, AREA] += sign * area
-                    if halved[i] and other == len(result):
+                for i, other in ((p, q), (q, p)):
+                    if not _limits_coverage(i, other, own, halved):
                         continue
                     _reflect(surfaces, forms, i, view, samples)
                     if not formed:
@@ -150,10 +144,17 @@ def _count_crossings(
     Edges that waviness displaces end beside each other, so that a line may slip through.
     """
     for k in range(2):
-        i, other = faces[k], faces[1 - k]
-        if own in (BOTH, i) and i < len(result) and not (halved[i] and other == len(result)):
+        i = faces[k]
+        if _limits_coverage(i, faces[1 - k], own, halved):
             reflect_samples(surfaces[i], view, samples)
             result[i, CROSSINGS] += screen_crossings(screen[i], samples)
+
+
+@compiled_loop
+def _limits_coverage(i: int, other: int, own: int, halved: Bools) -> bool:
+    """Whether an edge of a face and another, of its own face or both, limits what it covers."""
+    m = len(halved)
+    return i < m and own in (BOTH, i) and not (halved[i] and other == m)
 
 
 @compiled_loop

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.reflection import reflect, reflected_rays
-from tbcad.tolerancing.montecarlo.cell_edges import AREA, CROSSINGS, MISS_SQUARED, trace_cell_edges
+from tbcad.tolerancing.montecarlo.cell_edges import CROSSINGS, MISS_SQUARED, trace_cell_edges
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.tolerancing.montecarlo.edge_model import (
     APEX,
@@ -19,7 +19,6 @@ from tbcad.tolerancing.montecarlo.edge_model import (
     surface_tables,
     view_tables,
 )
-from tbcad.tolerancing.montecarlo.edge_samples import RIGHT
 from tbcad.types import Bools, Floats, Ints
 
 
@@ -33,20 +32,17 @@ class MirrorCoverage:
     # how often the image of the cell's outline crosses a half line from the object's centre: an odd
     # number where it surrounds the centre, (s, m)
     crossings: Ints
-    pixels: Floats  # size of the cell's picture, (s, m)
 
 
 def mirror_coverage(half: EdgeModel, draws: ShellDraws, worst_only: bool = False) -> MirrorCoverage:
     """Coverage of each mirror of one half, for s builds; see `trace_cell_edges` for worst_only."""
-    outlines = np.empty((len(draws), len(half), 3))
+    outlines = np.empty((len(draws), len(half), 2))
     surfaces, views = surface_tables(half, draws), view_tables(half, draws)
     forms, faces = form_tables(half, draws), half.pairs
     pairs = faces.pair, faces.offset, faces.face, faces.reach
     mirrors, out = surfaces[:, : len(half)], draws.valley[:, None]
     mirrors[..., APEX] += out[..., None] * mirrors[..., NORMAL]
     mirrors[..., CURVATURE] /= 1 + out * mirrors[..., CURVATURE]
-    if worst_only:  # pictures do not count: cameras that only turn see the same
-        views[:, RIGHT:] = views[:1, RIGHT:]
     for build in range(len(draws)):
         tables = surfaces, forms, views
         if build > 0 and all(np.array_equal(one[build - 1], one[build]) for one in tables):
@@ -56,9 +52,8 @@ def mirror_coverage(half: EdgeModel, draws: ShellDraws, worst_only: bool = False
             surfaces[build], forms[build], pairs, half.halved, views[build], half.screen,
             worst_only,
         )  # fmt: skip
-    area = np.abs(outlines[..., AREA]) * (draws.focal[:, None] / half.view.pixel_pitch) ** 2
     crossings = outlines[..., CROSSINGS].astype(np.int64)
-    return MirrorCoverage(2 * np.sqrt(outlines[..., MISS_SQUARED]), crossings, area)
+    return MirrorCoverage(2 * np.sqrt(outlines[..., MISS_SQUARED]), crossings)
 
 
 def virtual_camera_numbers(halved: Bools) -> Ints:
@@ -74,38 +69,35 @@ def virtual_camera_numbers(halved: Bools) -> Ints:
 
 def coverage(
     edge_models: EdgeModels, draws: tuple[ShellDraws, ShellDraws], worst_only: bool = False
-) -> tuple[Floats, Floats]:
-    """Exact coverage diameter (mm) and pixels of v virtual cameras in s builds, two of (s, v).
+) -> Floats:
+    """Exact coverage diameter of v virtual cameras in s builds, mm, (s, v).
 
-    The halves of a mirror on the seam count together: the smaller diameter, all pixels. A mirror
-    without a cell, or whose image does not surround the object's centre, covers nothing. With
-    worst_only, which takes less time, only the minimum diameter of each build is exact, the others
-    are not below theirs; and no pixels.
+    Of the halves of a mirror on the seam the smaller counts. A mirror without a cell, or whose
+    image does not surround the object's centre, covers nothing. With worst_only, which takes less
+    time, only the minimum of each build is exact, the others are not below theirs.
     """
     camera = virtual_camera_numbers(edge_models[1].halved)
     shape = (len(draws[0]), int(camera.max()) + 1)
-    diameter, crossings, pixels = np.full(shape, np.inf), np.zeros(shape, int), np.zeros(shape)
+    diameter, crossings = np.full(shape, np.inf), np.zeros(shape, int)
     for half, drawn, of_half in zip(edge_models, draws, np.split(camera, 2), strict=True):
         seen, place = mirror_coverage(half, drawn, worst_only), np.s_[:, of_half]
         of_mirrors = seen.diameter - drawn.facets[:, None]
         diameter[place] = np.minimum(diameter[place], of_mirrors)
         crossings[place] += seen.crossings
-        pixels[place] += seen.pixels
     surrounds = (crossings % 2 == 1) & np.isfinite(diameter)
-    return np.where(surrounds, np.maximum(diameter, 0.0), 0.0), pixels
+    return np.where(surrounds, np.maximum(diameter, 0.0), 0.0)
 
 
-def pointing(edge_model: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
-    """Errors of the ray of each mirror's centre pixel, for s builds of one edge_model.
+def pointing(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
+    """How far the ray of each mirror's centre pixel is off at the object, mm, (s, m).
 
     The centre pixel shows the apex, and its designed ray goes through the object's centre, for a
     mirror on the seam past it. A pixel is a fixed place on the sensor: moved and tilted cameras and
-    wrong focal lengths count. The errors are the angle between the designed and the built ray after
-    the mirror, radians, and the distance of the built ray from the point where the designed one is
-    nearest to the object's centre, mm, (s, m) each; NaN where it misses the sphere.
+    wrong focal lengths count. It is the distance of the ray of s builds after the mirror from the
+    point where the designed one is nearest to the object's centre; NaN where it misses the sphere.
     """
-    pinhole, middle, scale, *axes = np.moveaxis(view_tables(edge_model, draws)[:, :, None], 1, 0)
-    ray = _pixel_rays(edge_model, draws, axes)
+    pinhole, middle, scale, _ = np.moveaxis(view_tables(edge_model, draws)[:, :, None], 1, 0)
+    ray = _pixel_rays(edge_model, draws)
     mirrors = surface_tables(edge_model, draws)[:, : len(edge_model)]
     point, normal = _entry(mirrors, pinhole / scale, ray / scale)
     out = reflect(unit(ray), unit(normal / scale))
@@ -113,13 +105,15 @@ def pointing(edge_model: EdgeModel, draws: ShellDraws) -> tuple[Floats, Floats]:
     nearest = edge_model.apex - dot(edge_model.apex, designed)[:, None] * designed
     shells = [Rotation.from_rotvec(turn) for turn in draws.shell_tilt]
     aim = middle + np.stack([shell.apply(nearest, inverse=True) for shell in shells])
-    offset = norm(np.cross(point * scale - aim, out))
-    built = np.stack([shell.apply(rays) for shell, rays in zip(shells, out, strict=True)])
-    return np.arctan2(norm(np.cross(built, designed)), dot(built, designed)), offset
+    return norm(np.cross(point * scale - aim, out))
 
 
-def _pixel_rays(edge_model: EdgeModel, draws: ShellDraws, axes: list[Floats]) -> Floats:
-    """Rays (s, m, 3) of the same pixels in built cameras, whose axes are three of (s, 1, 3)."""
+def _pixel_rays(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
+    """Rays (s, m, 3) of the same pixels in built cameras, in the frame of the shell."""
+    shell = Rotation.from_rotvec(draws.shell_tilt)
+    camera = Rotation.from_rotvec(draws.camera_tilt)
+    built = [shell.apply(camera.apply(one), inverse=True) for one in edge_model.view.axes]
+    axes = np.stack(built)[:, :, None]
     designed = (edge_model.apex - edge_model.view.pinhole) @ edge_model.view.axes.T
     right, down, forward = designed[..., None].swapaxes(0, 1)
     focal = draws.focal[:, None, None] * forward

@@ -242,16 +242,14 @@ def form_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
 
 
 def view_tables(edge_model: EdgeModel, draws: ShellDraws) -> Floats:
-    """Camera and object of s builds, in the frame of the shell, (s, 7, 3).
+    """Camera and object of s builds, in the frame of the shell, (s, 4, 3).
 
-    The rows are pinhole, object's centre, scale, the camera's right, down and forward, and the
-    radius of the valleys' fillets. Camera and object are moved instead of the shell.
+    The rows are pinhole, object's centre, scale, and the radius of the valleys' fillets. Camera and
+    object are moved instead of the shell.
     """
     shell = Rotation.from_rotvec(draws.shell_tilt)
-    camera = Rotation.from_rotvec(draws.camera_tilt)
-    axes = [shell.apply(camera.apply(axis), inverse=True) for axis in edge_model.view.axes]
     pinhole = edge_model.view.pinhole + draws.camera_shift
     points = [shell.apply(point - draws.shell_shift, inverse=True) for point in (pinhole, 0.0)]
     valley = np.zeros_like(draws.scale)
     valley[:, 0] = draws.valley
-    return np.stack([*points, draws.scale, *axes, valley], axis=1)
+    return np.stack([*points, draws.scale, valley], axis=1)

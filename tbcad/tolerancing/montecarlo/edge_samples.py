@@ -26,15 +26,15 @@ STRIDE = 16
 # ray that is reflected there, and its moment about the object's centre.
 POINT, SCALED, RAY, REFLECTED, MOMENT = (3 * k * STRIDE for k in range(5))
 # Quantities of one number: the reflected ray's distance squared from the object's centre, its
-# place on the screen, the point's place in the picture.
-DISTANCE, SCREEN_X, SCREEN_Y, PICTURE_X, PICTURE_Y = (k * STRIDE for k in range(15, 20))
+# place on the screen.
+DISTANCE, SCREEN_X, SCREEN_Y = (k * STRIDE for k in range(15, 18))
 # Of each of an edge's faces: its normal at the point, of three numbers, and its waviness there.
-FIRST_NORMAL, SECOND_NORMAL = 20 * STRIDE, 23 * STRIDE
-FIRST_HEIGHT, SECOND_HEIGHT = 26 * STRIDE, 27 * STRIDE
-PLACES = 28 * STRIDE
+FIRST_NORMAL, SECOND_NORMAL = 18 * STRIDE, 21 * STRIDE
+FIRST_HEIGHT, SECOND_HEIGHT = 24 * STRIDE, 25 * STRIDE
+PLACES = 26 * STRIDE
 # Rows of a view; axes of a screen.
-PINHOLE, OBJECT, SCALE, RIGHT, DOWN, FORWARD = 0, 1, 2, 3, 4, 5
-VALLEY = 6  # radius of the fillets in the valleys, and nothing in its other two places
+PINHOLE, OBJECT, SCALE = 0, 1, 2
+VALLEY = 3  # radius of the fillets in the valleys, and nothing in its other two places
 FIRST_AXIS, SECOND_AXIS, FACING = 0, 1, 2
 # A parabola falls below its minimum sample by an eighth of the rise to the samples beside it at
 # most. The distance squared along an edge is smooth; four times as much is certain.
@@ -148,32 +148,6 @@ def crosses_half_axis(x: float, y: float, next_x: float, next_y: float) -> bool:
     if (y > 0) == (next_y > 0):
         return False
     return bool(x + y / (y - next_y) * (next_x - x) > 0)
-
-
-@compiled_loop
-def picture_area(view: Floats, samples: Floats) -> float:
-    """Area between the picture's centre and the points' line in it, by Richardson's rule."""
-    right, down, forward = vector(view[RIGHT]), vector(view[DOWN]), vector(view[FORWARD])
-    for s in range(SAMPLES):
-        ray = get_sample(samples, RAY, s)
-        depth = dot(ray, forward)
-        samples[PICTURE_X + s] = dot(ray, right) / depth
-        samples[PICTURE_Y + s] = dot(ray, down) / depth
-    fine, coarse = 0.0, 0.0
-    for s in range(SAMPLES - 1):
-        fine += _parallelogram(samples, s, s + 1)
-    for s in range(0, SAMPLES - 2, 2):
-        coarse += _parallelogram(samples, s, s + 2)
-    return (4 * fine - coarse) / 6
-
-
-@compiled_loop
-def _parallelogram(samples: Floats, a: int, b: int) -> float:
-    area: float = (
-        samples[PICTURE_X + a] * samples[PICTURE_Y + b]
-        - samples[PICTURE_Y + a] * samples[PICTURE_X + b]
-    )
-    return area
 
 
 @compiled_loop

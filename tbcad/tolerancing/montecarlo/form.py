@@ -77,25 +77,17 @@ def monomials(x: Floats, y: Floats) -> Floats:
 def _term(n: int, m: int) -> Floats:
     """Coefficients of x^i y^j of one Zernike polynomial, (degree + 1, degree + 1)."""
     size, result = abs(m), np.zeros((DEGREE + 1, DEGREE + 1))
-    around = np.zeros_like(result)
-    for j in range(size + 1):  # real or imaginary part of (x + i y)^|m|
-        power = comb(size, j) * 1j**j
-        around[size - j, j] = power.real if m >= 0 else power.imag
     for k in range((n - size) // 2 + 1):
+        squares = (n - size) // 2 - k  # power of x^2 + y^2
         radial = (-1) ** k * factorial(n - k) / factorial(k)
-        radial /= factorial((n + size) // 2 - k) * factorial((n - size) // 2 - k)
-        result += radial * _times_radius(around, (n - size) // 2 - k)
+        radial /= factorial((n + size) // 2 - k) * factorial(squares)
+        for j in range(size + 1):  # real or imaginary part of (x + i y)^|m|
+            around = comb(size, j) * 1j**j
+            for i in range(squares + 1):
+                place = size - j + 2 * (squares - i), j + 2 * i
+                part = around.real if m >= 0 else around.imag
+                result[place] += radial * comb(squares, i) * part
     return np.asarray(result * sqrt((n + 1) * (1 if m == 0 else 2)))
-
-
-def _times_radius(polynomial: Floats, times: int) -> Floats:
-    """A polynomial times (x^2 + y^2)^times."""
-    for _ in range(times):
-        product = np.zeros_like(polynomial)
-        product[2:] += polynomial[:-2]
-        product[:, 2:] += polynomial[:, :-2]
-        polynomial = product
-    return polynomial
 
 
 def mean_square_slope() -> float:

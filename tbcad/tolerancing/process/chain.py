@@ -69,13 +69,20 @@ class Micrometres(ErrorSpec):
     mean: float = Field(0.0, ge=-10_000, le=10_000)
 
 
-class SmoothMicrometres(Micrometres):
-    """An error in micrometres that neighbouring places of a part share."""
+class WithoutMean(ErrorSpec):
+    """An error that differs from place to place or is the same in all builds."""
 
     mean: float = Field(0.0, ge=0, le=0)
-    """None: it would move the whole part."""
+    """None: it would move the whole part, or is the magnitude."""
     distribution: Literal["normal"] = "normal"
     """Always normal."""
+
+
+class SmoothMicrometres(WithoutMean):
+    """An error in micrometres that neighbouring places of a part share."""
+
+    unit: ClassVar[float] = MICROMETRE
+    magnitude: float = Field(ge=0, le=10_000)
     length_mm: float = Field(ge=20, le=10_000)
     """Correlation length: at this distance 61 % of the error is shared, at twice of it 14 %."""
 
@@ -85,24 +92,18 @@ class SmoothMicrometres(Micrometres):
         return replace(super().error, length=self.length_mm)
 
 
-class RootMeanSquare(Micrometres):
+class RootMeanSquare(WithoutMean):
     """A form error within each mirror, in micrometres."""
 
-    mean: float = Field(0.0, ge=0, le=0)
-    """None: it differs from mirror to mirror."""
-    distribution: Literal["normal"] = "normal"
-    """Always normal."""
+    unit: ClassVar[float] = MICROMETRE
+    magnitude: float = Field(ge=0, le=10_000)
 
 
-class FilletRadius(ErrorSpec):
+class FilletRadius(WithoutMean):
     """Radius of the fillets in the valleys between mirrors, in millimetres."""
 
     magnitude: float = Field(ge=0, le=10)
     """The radius: the same in all builds."""
-    mean: float = Field(0.0, ge=0, le=0)
-    """None: the radius is the magnitude."""
-    distribution: Literal["normal"] = "normal"
-    """Without a meaning here."""
 
     @property
     def error(self) -> Error:

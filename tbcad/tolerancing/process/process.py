@@ -22,7 +22,7 @@ from tbcad.core.spec.errors import (
     validation_error,
 )
 from tbcad.core.spec.prototype import GradeName
-from tbcad.core.spec.section import Section, as_tuple
+from tbcad.core.spec.section import Section, as_tuple, whole
 from tbcad.prototype.balls.catalogue import load_grades
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.process.chain import (
@@ -47,15 +47,8 @@ BUILT_IN = (
     "nickel-diamond", "nickel-milled", "epoxy", "urethane", "segments", "inserts",
 )  # fmt: skip
 DEFAULT_PROCESS = "sla"
-RENAMED = {"machined": "cnc"}  # as version 0.1.0 called the printer
 BY_USER = "set by an option"
 SHARP = "Not stated: valleys are taken as sharp, a judgement that flatters milled shells"
-
-
-def _whole(value: object) -> object:
-    if type(value) is not int:  # true and 1.0 equal 1, so Literal[1] would take them
-        raise ValueError("allowed is the whole number 1: change it")
-    return value
 
 
 class Process(Section):
@@ -65,7 +58,7 @@ class Process(Section):
     """Name of the process, for reports."""
     title: str = Field(pattern=r"\S", max_length=200)
     """The process in words."""
-    schema_version: Annotated[Literal[1], BeforeValidator(_whole)] = Field(1, alias="schema")
+    schema_version: Annotated[Literal[1], BeforeValidator(whole)] = Field(1, alias="schema")
     """Version of this table's keys."""
     steps: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
     """Steps of a chain, whose errors are added up; none: the figures are the process' own."""
@@ -179,9 +172,6 @@ def _built_in(name: str) -> Table:
 def _own(path: Path) -> Table:
     if path.is_file():
         return _resolved(read_toml(path, str(path), "process"), path.stem, str(path))
-    if str(path) in RENAMED:
-        new = RENAMED[str(path)]
-        raise SpecError(f"process {path} is called {new}: write {new}")
     close = get_close_matches(str(path).lower(), BUILT_IN, 1)
     hint = f"did you mean {close[0]}?" if close else "name one of these or check the path"
     raise SpecError(

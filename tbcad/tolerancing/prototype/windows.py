@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
-from tbcad.core.optics.reflection import reflected_rays
+from tbcad.core.optics.reflection import reflected_rays, reflection_points
 from tbcad.core.optics.windows import cell_windows
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, PrototypeRun, prototype_runs
@@ -29,15 +29,11 @@ from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
 from tbcad.tolerancing.montecarlo.draws import Shape, draw_kinds
 from tbcad.tolerancing.montecarlo.edge_model import ASYMMETRIC
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.prototype.rays import (
-    SIDE_SAMPLES,
-    coarse_directions,
-    highlights,
-    minimum_miss_distances,
-)
+from tbcad.tolerancing.prototype.rays import SIDE_SAMPLES, minimum_miss_distances
 from tbcad.types import Bools, Floats, Ints
 
 FIRST_STREAM = 1000  # random streams of a build begin here, beyond those of its shells
+ITERATIONS = 16  # of the search for the point of a ball that shows the object's centre
 
 
 @dataclass(frozen=True)
@@ -122,7 +118,6 @@ class RunWindows:
     ball: Ints  # number of the ball in each window, (m,)
     stop: Ints  # number of its stop, (m,)
     side: Floats  # unit directions along the sides of all windows, (e, SIDE_SAMPLES, 3)
-    coarse: Floats  # see tbcad.tolerancing.prototype.rays.coarse_directions
     first: Ints  # number of each mirror's first side, (m + 1,)
     middle: Floats  # unit directions of the mirrors' apices, (m, 3)
     outward: Floats  # directions from there to the outline, away from the seam, (m, 3)
@@ -176,9 +171,7 @@ def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
     halved = run.reflector.mirrors.apex[:, 0] == 0
     outline = np.add.reduceat(side.mean(axis=1), first[:-1]) / np.diff(first)[:, None]
     outward = np.where(halved[:, None], outline - middle, ASYMMETRIC)
-    return RunWindows(
-        run.ball, run.stop, side, coarse_directions(side), first, middle, outward, halved
-    )
+    return RunWindows(run.ball, run.stop, side, first, middle, outward, halved)
 
 
 @dataclass(frozen=True)
@@ -241,7 +234,8 @@ def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: i
     nearer = np.array([[1 / draws.focal[build]], [1 / draws.focal[build]], [1.0]])
     lens = nearer * Rotation.from_rotvec(draws.camera_tilt[build]).apply(model.axes)
     lenses = np.repeat(lens[None], len(radius), axis=0)
-    return RunPose(pinhole, lenses, centre, radius, highlights(pinhole, centre, radius))
+    shown = reflection_points(centre, radius, np.zeros(3), pinhole, ITERATIONS)
+    return RunPose(pinhole, lenses, centre, radius, unit(shown - pinhole))
 
 
 def tilted_centres(plan: Plan, tilt: Floats) -> Floats:
@@ -287,7 +281,7 @@ def prototype_result(model: PrototypeWindows, draws: PrototypeDraws) -> Prototyp
 def _seen(model: PrototypeWindows, poses: list[RunPose]) -> tuple[Floats, Floats]:
     misses = [
         minimum_miss_distances(
-            *((run.side, run.coarse, run.first), run.outward),
+            *((run.side, run.first), run.outward),
             *(pose.highlight, pose.lens, pose.pinhole, pose.centre, pose.radius),
         )
         for run, pose in zip(model.runs, poses, strict=True)

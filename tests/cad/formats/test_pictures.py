@@ -168,10 +168,10 @@ def test_palettes_of_tiff_have_16_bits(spread: int, kind: Any) -> None:
     [
         (tiff(GREY.astype(np.uint32)), "numbers of 32 bits"),
         (tiff(GREY.astype(np.int16)), "signed numbers of 16 bits"),
-        (tiff(RGB, photometric="cielab"), "CIE L"),
+        (tiff(RGB, photometric="cielab"), "pixels of kind CIELAB"),
         (tiff(GREY, compression="jpeg"), "compressed as JPEG"),
-        (tiff(GREY, photometric="cfa"), "mosaic"),
-        (tiff(RGB, photometric="rgb", compression="jpeg"), "YCbCr"),
+        (tiff(GREY, photometric="cfa"), "pixels of kind CFA"),
+        (tiff(RGB, photometric="rgb", compression="jpeg"), "pixels of kind YCBCR"),
         (tiff(np.stack([GREY] * 3), imagej=True), "has 3 pictures in it"),
         (tiff(GREY / np.float32(2) - 9), "values that are no light"),
         (tiff(np.where(GREY > 99, np.nan, 1).astype(np.float32)), "values that are no light"),

@@ -16,7 +16,7 @@ from tbcad.core.geometry.primitives import (
     enclosing_triangles,
     volume,
 )
-from tbcad.core.geometry.rotations import even_angles, rotated, rotated_about_x, unit_circle
+from tbcad.core.geometry.rotations import rotated, rotated_about_x
 from tbcad.core.geometry.round_cones import RoundCones, contact_angle, smallest_sphere, spheres
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.geodesic import geodesic
@@ -140,11 +140,6 @@ def test_rotations_about_axes_against_quaternions() -> None:
     x = np.array([1.0, 0.0, 0.0])
     assert turned == pytest.approx(rotated(VECTORS, x, ANGLES), abs=1e-14)
     assert np.array_equal(turned[:, 0], VECTORS[:, 0])
-
-
-def test_points_of_a_circle_divide_it_evenly_counter_clockwise() -> None:
-    corners = unit_circle(even_angles(4))
-    assert corners == pytest.approx(np.array([[1, 0], [0, 1], [-1, 0], [0, -1]]), abs=1e-15)
 
 
 @pytest.mark.parametrize("shape", [(3,), (1, 3), (7, 300, 3), (2000, 2), (0, 3)])

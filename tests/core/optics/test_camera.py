@@ -15,7 +15,6 @@ from tbcad.core.optics.camera import (
 from tbcad.core.optics.led_dome import disc_images, dome_images, dome_samples, sight_axes
 from tbcad.core.optics.reflection import miss_distances, reflected_rays, reflection_points
 from tests.rig.machine.test_machine import MACHINE
-from tests.sphere_misses import sphere_miss_distances
 
 AXIS = unit(np.array([0.3, -0.5, 0.8]))
 CAMERA = LensCamera(
@@ -106,16 +105,6 @@ def test_ray_over_the_apex_passes_the_origin(paper_array: MirrorArray) -> None:
     assert np.abs(np.einsum("md,md->m", across, seam.apex)).max() < 1e-9
     away = np.linalg.norm(seam.apex[:, 1:], axis=1) / np.linalg.norm(ray[:, 1:], axis=1)
     assert (seam.apex[:, 0] + away * ray[:, 0]).max() < 1e-9
-
-
-def test_rays_find_their_points_on_the_spheres(paper_array: MirrorArray) -> None:
-    """Points beside the apices, given and found again by the intersection with the sphere."""
-    mirrors, pinhole = paper_array.mirrors, paper_array.camera.pinhole
-    normal = unit(mirrors.normal + 0.01 * unit(np.random.default_rng(1).normal(size=(847, 3))))
-    point = mirrors.centre + mirrors.radius[:, None] * normal
-    ray = unit(point - pinhole)
-    found = sphere_miss_distances(pinhole, ray, mirrors.centre, mirrors.radius)
-    assert found == pytest.approx(miss_distances(pinhole, point, normal), abs=1e-9)
 
 
 @pytest.mark.parametrize("radius", [1.0, 20.0, 300.0, 5000.0])

@@ -187,13 +187,6 @@ def outside(cones: RoundCones, point: np.ndarray) -> float:
     return worst
 
 
-@pytest.mark.parametrize(("a", "b"), [(1.0, 1.0), (3.0, 1.5)])
-def test_area_of_an_ellipse(a: float, b: float) -> None:
-    turn = 2 * np.pi * np.arange(ball_light.OUTLINE_POINTS) / ball_light.OUTLINE_POINTS
-    curve = np.stack([7 + a * np.cos(turn), b * np.sin(turn) - 2], axis=-1)[None]
-    assert ball_light.enclosed_areas(curve)[0] == pytest.approx(np.pi * a * b, rel=1e-12)
-
-
 def test_pixels_against_counting(paper_array: MirrorArray) -> None:
     """Rays through the centres of all pixels about a mirror that meet the capture sphere."""
     camera, mirrors, i = paper_array.camera, paper_array.mirrors, 400
@@ -210,12 +203,3 @@ def test_pixels_against_counting(paper_array: MirrorArray) -> None:
     sphere = mirrors.centre[i], np.array(mirrors.radius[i])
     miss = sphere_miss_distances(camera.pinhole, ray, *sphere)
     assert pixels == pytest.approx((miss <= CAPTURE).sum() / 16, rel=2e-3)
-
-
-def test_field_angles_against_the_scalar_product_with_the_axis(paper_array: MirrorArray) -> None:
-    pinhole = paper_array.camera.pinhole
-    ray = unit(paper_array.mirrors.apex - pinhole)
-    expected = np.arccos(ray @ unit(-pinhole))
-    assert ball_light.field_angles(paper_array.ellipsoid, paper_array.polar) == pytest.approx(
-        expected
-    )

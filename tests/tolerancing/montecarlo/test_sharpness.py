@@ -15,7 +15,7 @@ from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import camera_around_object, exact_tracer, reflect_pixels
 from tbcad.light.simulate.scene.reflector import Reflector, reflectors
 from tbcad.light.simulate.views.viewpoints import ground_truths
-from tbcad.tolerancing.montecarlo.coverage import mirror_coverage, pointing
+from tbcad.tolerancing.montecarlo.coverage import pointing
 from tbcad.tolerancing.montecarlo.draws import draw
 from tbcad.tolerancing.montecarlo.edge_model import edge_model
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
@@ -97,26 +97,13 @@ class TestActual:
         assert built.camera.hfov == pytest.approx(at.camera.hfov, abs=1e-14)
         assert np.array_equal(numbers(built), numbers(at))
 
-    def test_pixels_are_those_of_the_fast_model(self, cameras: Cameras) -> None:
-        """One ray a pixel against areas of outlines; of the border half a pixel is uncertain.
-
-        Boxes hold all pixels, as if every mirror were looked for everywhere.
-        """
-        both, compared = builds(cameras, LARGE, 3), 0
-        for at, drawn in zip(cameras, both, strict=True):
-            area = mirror_coverage(edge_model(at), drawn).pixels
+    def test_boxes_hold_all_pixels(self, cameras: Cameras) -> None:
+        """As if every mirror were looked for everywhere."""
+        for at, drawn in zip(cameras, builds(cameras, LARGE, 3), strict=True):
             for k in range(3):
                 built = built_reflector(at, drawn, k)
-                count = np.bincount(numbers(built).ravel(), minlength=len(at) + 1)[1:]
                 named = {field.name: getattr(built, field.name) for field in fields(built)}
                 assert np.array_equal(numbers(built), numbers(WholeFrame(**named)))
-                box, view = built.boxes(), built.camera
-                inside = (box[:, ::2].min(axis=1) > 0) & (box[:, 1] < view.width_px)
-                inside &= box[:, 3] < view.height_px
-                close = pytest.approx(area[k][inside], abs=0.5 * np.sqrt(count.max()))
-                assert count[inside] == close
-                compared += int(inside.sum())
-        assert compared > 60
 
     def test_rays_are_off_as_the_fast_model_says(self, cameras: Cameras) -> None:
         """The pixels that should show the apices, seen by the built camera after its mirrors."""
@@ -130,7 +117,7 @@ class TestActual:
             along = np.einsum("mx,mx->m", at.mirrors.apex, designed)
             aim = at.mirrors.apex - along[:, None] * designed
             missed = np.linalg.norm(np.cross(rays.origin[0] - aim, rays.direction[0]), axis=1)
-            offset = pointing(edge_model(at), drawn)[1][0]
+            offset = pointing(edge_model(at), drawn)[0]
             assert missed == pytest.approx(offset, rel=1e-6, abs=1e-9)
             assert missed.min() > 0.01
 

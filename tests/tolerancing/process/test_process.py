@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 from dataclasses import fields
 from importlib.resources import files
 from pathlib import Path
@@ -64,27 +63,11 @@ def without(text: str, kind: str) -> str:
 
 
 class TestBuiltIn:
-    def test_a_former_name_is_refused_with_the_present_one(self) -> None:
-        assert refusal("machined") == "process machined is called cnc: write cnc"
-
     def test_are_all_files_there_are(self) -> None:
         there = files("tbcad.tolerancing").joinpath("process").iterdir()
         assert sorted(f"{name}.toml" for name in BUILT_IN) == sorted(
             file.name for file in there if file.name.endswith(".toml") and file.name != STEPS_FILE
         )
-
-    @pytest.mark.parametrize("name", BUILT_IN)
-    def test_every_figure_has_a_source_or_says_that_it_is_a_judgement(self, name: str) -> None:
-        process = load_process(name)
-        assert process.name == name
-        outside = re.compile(
-            r"judgement|vendors|Formlabs|Apollo|ISO \d|Allied|Data sheets|Minebea|\.com"
-            r"|verification|STEP|The (same|shift)|(Aluminium|steel|nickel) 0\.0|As sphere|as mill"
-            r"|as diamond-mill|makers|No step",
-            re.IGNORECASE,
-        )
-        for kind in KINDS:
-            assert outside.search(getattr(process, kind).source), kind
 
     @pytest.mark.parametrize(
         ("name", "limit_mm"),
@@ -147,7 +130,7 @@ FILES: tuple[tuple[str | bytes, str], ...] = (
     (table(1, 0) + "[spere_centre_um]\nmagnitude = 1\n", "unknown key spere_centre_um: did you"),
     (table(1, 0).replace('"G3"', '"G4"'), "ball_grade is 'G4', allowed is G3 or G5"),
     (table(1, 0).replace("schema = 1", "schema = 2"), "schema is 2, allowed is 1"),
-    (table(1, 0).replace("schema = 1", "schema = true"), "allowed is the whole number 1"),
+    (table(1, 0).replace("schema = 1", "schema = true"), "allowed is a whole number"),
     *((without(table(1, 0), kind), f"{kind} is missing") for kind in ("warp_um", "waviness_um")),
     *((table(1, 0, **{kind: f"{body}\n"}), said) for kind, body, said in BODIES),
 )

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from tbcad.core.geometry.vectors import FLIP_X, dot
-from tbcad.core.optics.cells import Arcs, Cells, arc_steps, plane_sections
+from tbcad.core.optics.cells import Arcs, Cells, FaceIntegrals, arc_steps, plane_sections
 from tbcad.core.optics.pedestals.borders import ON_PLANE_MM, PedestalLayout, Sides, outline_sides
 from tbcad.core.optics.pedestals.plan import PedestalPlan, planned
 from tbcad.core.optics.power_diagram import PLANES, NotRegularError
@@ -216,28 +216,8 @@ def groove_walls(cells: Cells) -> GrooveWalls:
     return GrooveWalls.of_planes(cells.walls[:, 0], point, -cells.surfaces.normal[first:])
 
 
-@dataclass(frozen=True)
-class WallMoments:
-    """Integrals over w walls."""
-
-    area: Floats  # mm^2, (w,)
-    first: Floats  # integral of the place, from the origin, mm^3, (w, 3)
-    normal: Floats  # out of the solid, (w, 3)
-
-    @property
-    def volume(self) -> float:
-        """Between the origin and all walls, mm^3: a third of the integral of x.n."""
-        return float(dot(self.first, self.normal).sum()) / 3
-
-    @property
-    def volume_moment(self) -> Floats:
-        """Integral of x over that volume, mm^4, (3,): x.n is the same all over a wall."""
-        height = dot(self.first, self.normal) / self.area
-        return np.asarray((height[:, None] * self.first).sum(axis=0)) / 4
-
-
-def wall_moments(cells: PedestalCells, origin: Floats) -> WallMoments:
-    """Moments of the walls about an origin (3,), mm.
+def wall_integrals(cells: PedestalCells, origin: Floats) -> FaceIntegrals:
+    """Integrals over the walls, with an origin (3,), mm.
 
     A wall is taken as triangles with one corner at an end of the groove's bottom. Those along the
     arc are infinitely thin: Gauss's rule adds them up to rounding.
@@ -251,7 +231,10 @@ def wall_moments(cells: PedestalCells, origin: Floats) -> WallMoments:
     # Arcs turn counter-clockwise about their walls seen from the light.
     area = dot(np.cross(x - near[:, None], step), normal[:, None]) / 2
     middle = near[:, None] + (x - near[:, None]) * 2 / 3
-    return WallMoments(area.sum(axis=1), np.einsum("wk,wkx->wx", area, middle), normal)
+    first, areas = np.einsum("wk,wkx->wx", area, middle), area.sum(axis=1)
+    cones = dot(first, normal)  # x.n is the same all over a wall
+    moment = ((cones / areas)[:, None] * first).sum(axis=0) / 4
+    return FaceIntegrals(origin, float(cones.sum()) / 3, moment, float(areas.sum()))
 
 
 def _bottoms(cells: PedestalCells, origin: Floats) -> tuple[Floats, Floats]:

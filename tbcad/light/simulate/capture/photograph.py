@@ -230,3 +230,13 @@ def traced_pixels(
 def virtual_cameras(array: MirrorArray) -> int:
     """Virtual cameras of both halves together; those that the seam halves count once."""
     return 2 * len(array) - int((array.u[:, 0] == 0).sum())
+
+
+def virtual_camera_pixels(array: MirrorArray, radius: float) -> Floats:
+    """Pixels that see a capture sphere, over the v virtual cameras of both halves, (v,).
+
+    The array is camera a's; both halves of a mirror on the seam count together.
+    """
+    sensor = Sensor(array.camera.width_px, array.camera.height_px)
+    seen, halved = count_pixels(array, (sensor,), radius)[0].seen, array.u[:, 0] == 0
+    return np.concatenate([np.where(halved, 2 * seen, seen), seen[~halved]])
