@@ -27,13 +27,12 @@ from tbcad.light.simulate.capture.light_field import traced_light_field
 from tbcad.light.simulate.capture.photograph import Sensor, count_pixels
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.viewpoints import (
+    BY_NEAREST,
     ELEVATIONS_DEG,
     ground_truths,
     image_quality,
     viewpoints_around,
-    views_by,
 )
 from tbcad.types import Bytes, Floats, Ints
 
@@ -66,8 +65,8 @@ def mean_ssim(design: MirrorDesign, method: ViewsBy = "nearest") -> float:
     """Mean SSIM of views over the frame, from the stated viewpoints."""
     with _one_at_a_time:
         truth = _truth(design.spec.optics.capture_diameter_mm)
-    tiles = MirrorTiles(traced_light_field(design, truth.scene))
-    picture_of = views_by(BY_FIELD if method == "field" else method, tiles, truth.scene)
+    by = BY_FIELD if method == "field" else BY_NEAREST
+    picture_of = by.views(traced_light_field(design, truth.scene))
     views = zip(truth.cameras, truth.pictures, strict=True)
     return float(np.mean([image_quality(real, picture_of(at)).ssim for at, real in views]))
 

@@ -17,14 +17,12 @@ from tbcad.light.simulate.capture.light_field import traced_light_field
 from tbcad.light.simulate.capture.photograph import Sensor, count_pixels, virtual_cameras
 from tbcad.light.simulate.scene.object import patterned_ball
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.viewpoints import (
-    StudyMethod,
+    ViewMethod,
     ground_truths,
     image_quality_map,
     object_masks,
     viewpoints_over_hemisphere,
-    views_by,
 )
 from tbcad.studies.paper import MAX_N, notes, try_design, with_lens_of_table_i
 from tbcad.types import Bools, Bytes, Progress
@@ -72,7 +70,7 @@ def balance(
     ns: tuple[int, ...],
     views: int,
     distance_mm: float,
-    method: StudyMethod,
+    method: ViewMethod,
     progress: Progress = lambda _: None,
 ) -> Study:
     """The study: SSIM of views over n at the design's sensor, for four objects."""
@@ -107,7 +105,7 @@ def _of_n(
     n: int,
     seen: list[Subject],
     cameras: list[Camera],
-    method: StudyMethod,
+    method: ViewMethod,
     progress: Progress,
 ) -> list[Record]:
     """A row for each object, or for what a refusal of the design says."""
@@ -134,11 +132,10 @@ def _counts(design: MirrorDesign) -> Record:
 
 
 def ssim_on_object(
-    design: MirrorDesign, subject: Subject, cameras: list[Camera], method: StudyMethod
+    design: MirrorDesign, subject: Subject, cameras: list[Camera], method: ViewMethod
 ) -> float:
     """Mean local SSIM where the object is, over all views."""
-    tiles = MirrorTiles(traced_light_field(design, subject.scene))
-    view = views_by(method, tiles, subject.scene)
+    view = method.views(traced_light_field(design, subject.scene))
     values = [
         image_quality_map(truth, view(at))[1][mask].mean()
         for at, truth, mask in zip(cameras, subject.truths, subject.masks, strict=True)
@@ -160,7 +157,7 @@ def _best(table: Table, subject: Subject) -> list[Record]:
     return [{**best, "cameras_per_pixel": ratio, "object": subject.name}]
 
 
-def _panel(table: Table, seen: list[Subject], method: StudyMethod) -> PlotPanel:
+def _panel(table: Table, seen: list[Subject], method: ViewMethod) -> PlotPanel:
     styles = ("C0o-", "C0s--", "C1o-", "C1s--")
     series = []
     for subject, style in zip(seen, styles, strict=True):

@@ -23,6 +23,7 @@ from tbcad.light.simulate.views.refocus import (
     pixel_points,
     refocus,
 )
+from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.simulate.views.viewpoints import (
     Viewpoints,
     ground_truths,
@@ -155,7 +156,9 @@ def _views(
 ) -> dict[str, dict[str, Floats]]:
     """Quality of the pinholes' views and of those with the aperture, each (v,) by its name."""
     scene = targets.scene
-    pinhole = view_quality(tiles, scene, targets.pinholes, targets.truths, "nearest", progress)
+    pinhole = view_quality(
+        lambda at: synthesise(tiles, at).image, scene, targets.pinholes, targets.truths, progress
+    )
     rows: list[dict[str, float]] = []
     masks = object_masks(scene, targets.lenses)
     for view, truth, mask in zip(targets.lenses, targets.lens_truths, masks, strict=True):

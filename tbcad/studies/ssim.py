@@ -21,10 +21,9 @@ from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import ExportedDesign, reflectors
-from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.viewpoints import (
     QUALITY,
-    StudyMethod,
+    ViewMethod,
     Viewpoints,
     ground_truths,
     view_quality,
@@ -66,7 +65,7 @@ def ssim(
     subject: SceneObject,
     sensors: tuple[Sensor, ...],
     viewpoints: Viewpoints,
-    method: StudyMethod,
+    method: ViewMethod,
     progress: Progress = lambda _: None,
 ) -> Study:
     """The study: captures with every sensor and its n, and views of each against the truth."""
@@ -90,7 +89,7 @@ def _compared(
     scene: Scene,
     viewpoints: Viewpoints,
     truths: list[Bytes],
-    method: StudyMethod,
+    method: ViewMethod,
     progress: Progress,
     sensor: Sensor,
 ) -> list[Record]:
@@ -100,8 +99,7 @@ def _compared(
     quality = {name: np.full(len(cameras), np.nan) for name in QUALITY}
     if attempt.design is not None:
         with _light_field(attempt.design, scene, progress) as light_field:
-            tiles = MirrorTiles(light_field)
-            quality = view_quality(tiles, scene, cameras, truths, method, progress)
+            quality = view_quality(method.views(light_field), scene, cameras, truths, progress)
     head: Record = {**asdict(sensor), "n": n}
     views = Table.of_columns("", {**viewpoints.angles(), **quality}).records()
     return [{**head, **view, "reason": attempt.reason} for view in views]
@@ -237,7 +235,7 @@ def prototype_vs_shell(
     export: ExportedDesign,
     subject: SceneObject,
     viewpoints: Viewpoints,
-    method: StudyMethod,
+    method: ViewMethod,
     samples: int = 3,
     progress: Progress = lambda _: None,
 ) -> Study:
@@ -251,8 +249,7 @@ def prototype_vs_shell(
     kinds: tuple[Geometry, ...] = ("spheres", "prototype")
     light_fields = (photographed(export, scene, kind, samples, progress) for kind in kinds)
     shell, prototype = (
-        view_quality(MirrorTiles(one), scene, views, truths, method, progress)
-        for one in light_fields
+        view_quality(method.views(one), scene, views, truths, progress) for one in light_fields
     )
     facts = f"Object: {subject.name}; {method}; {samples} x {samples} rays a pixel."
     columns = {

@@ -33,7 +33,7 @@ from tbcad.light.simulate.capture.photograph import (
 )
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.reflector import Reflector, reflectors
-from tbcad.light.simulate.views.viewpoints import viewpoints_around
+from tbcad.light.simulate.views.viewpoints import BY_NEAREST, viewpoints_around
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
 from tbcad.studies.elevation import capture_area, elevation
 from tbcad.studies.paper import is_table_i, with_lens_of_table_i
@@ -114,7 +114,7 @@ def test_a_refused_design_is_a_row_with_its_reason(monkeypatch: pytest.MonkeyPat
     assert [at[name] for name in COUNTED] == [None] * 7
     assert "no radius gives" in str(at["reason"])
     assert len(study_files(study)) == 7
-    found = ssim(spec, built_in_object(36.0), (Sensor(208, 155),), around, "nearest", print)
+    found = ssim(spec, built_in_object(36.0), (Sensor(208, 155),), around, BY_NEAREST, print)
     assert "no radius gives" in str(found.tables[0].column("reason"))
     assert found.figures == ()
 

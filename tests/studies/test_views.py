@@ -16,6 +16,7 @@ from tbcad.light.simulate.scene.object import built_in_object, patterned_ball
 from tbcad.light.simulate.scene.ray_casting import LAMPS, cast_rays, prepared_scene
 from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.light.simulate.views.viewpoints import (
+    BY_NEAREST,
     Viewpoints,
     viewpoints_around,
     viewpoints_over_hemisphere,
@@ -55,7 +56,7 @@ class SmallViews(Viewpoints):
 @pytest.fixture(scope="module")
 def study() -> Study:
     viewpoints = SmallViews(**vars(viewpoints_around((15.0, 60.0), 1, 640.0)))
-    return ssim(load_spec(None, SMALL), built_in_object(60.0), SENSORS, viewpoints, "nearest")
+    return ssim(load_spec(None, SMALL), built_in_object(60.0), SENSORS, viewpoints, BY_NEAREST)
 
 
 def test_more_pixels_make_better_and_sharper_views(study: Study) -> None:
@@ -93,7 +94,7 @@ def test_prototype_against_the_shell(export_folder: Path) -> None:
     """Fewer pixels and other virtual cameras: views that are slightly worse."""
     export = read_export(export_folder)
     viewpoints = viewpoints_around((20.0, 60.0), 2, 640.0)
-    found = prototype_vs_shell(export, built_in_object(60.0), viewpoints, "nearest", 2)
+    found = prototype_vs_shell(export, built_in_object(60.0), viewpoints, BY_NEAREST, 2)
     rows = {figure.quantity: figure.value for figure in found.figures}
     shell, balls = (rows[f"mean SSIM of the {name}'s views"] for name in ("shell", "prototype"))
     assert 0.5 < balls < shell < 1
@@ -145,7 +146,7 @@ def test_viewpoints_around_the_object() -> None:
 def test_balance_of_every_object_at_every_n() -> None:
     """A matt surface near the reference plane needs pixels, one far from it directions."""
     small = load_spec(None, ["camera.width_px=416", "camera.height_px=310"])
-    table, best = balance(small, (4, 8), 3, 640.0, "nearest").tables
+    table, best = balance(small, (4, 8), 3, 640.0, BY_NEAREST).tables
     assert len(table.rows) == 2 * 4
     assert table.column("virtual_cameras") == [89] * 4 + [337] * 4
     pixels = table.numbers("pixels")

@@ -21,7 +21,7 @@ from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.image_files import write_images
 from tbcad.light.simulate.parallel import over_chunks
 from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
-from tbcad.light.simulate.views.viewpoints import OwnMethod
+from tbcad.light.simulate.views.viewpoints import ViewMethod
 from tbcad.types import Bytes, Floats
 
 STRIDE = 0.45  # distances of nodes between samples
@@ -151,4 +151,4 @@ def quick_views(source: LightField) -> Callable[[Camera], Bytes]:
     return lambda camera: field_picture(made, camera).image
 
 
-BY_FIELD = OwnMethod("field", quick_views)
+BY_FIELD = ViewMethod("field", quick_views)

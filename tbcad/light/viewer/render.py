@@ -25,7 +25,6 @@ from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import ThinLens, lens_pinholes, refocus
 from tbcad.light.simulate.views.synthesis import (
-    Method,
     horizon_search_radius,
     search_radius,
     synthesise,
@@ -35,7 +34,7 @@ from tbcad.light.viewer.page import Query, filled
 from tbcad.output.single_files import check_file
 from tbcad.types import Bytes, Progress
 
-MethodAtRest = Method | Literal["depth"]
+MethodAtRest = Literal["nearest", "depth"]
 View = Callable[[Camera], Bytes]  # what makes the picture (h, w, 3) of a camera
 JPEG_QUALITY = 88
 # While the view moves, a lens has 9 pinholes instead of 69, at half the width and height.
@@ -130,7 +129,7 @@ def _synthesised(
     if method == "depth":
         views = by_depth()
         return lambda view: views.of(view)[0].image
-    return lambda view: synthesise(tiles, view, method).image
+    return lambda view: synthesise(tiles, view).image
 
 
 def capture_mm(pictured: MirrorTiles | Field) -> float:

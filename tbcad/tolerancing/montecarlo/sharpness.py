@@ -175,7 +175,7 @@ def _rotated(frame: CameraFrame, residual: float, generator: np.random.Generator
 
 def _ssim(source: LightField, reference: ReferenceViews) -> Floats:
     tiles = MirrorTiles(source)
-    pictures = [synthesise(tiles, view, "nearest").image for view in reference.views]
+    pictures = [synthesise(tiles, view).image for view in reference.views]
     pairs = zip(reference.truths, pictures, strict=True)
     qualities = in_threads(lambda pair: image_quality(*pair), pairs)
     return np.array([quality.ssim for quality in qualities])

@@ -94,7 +94,7 @@ def test_views_are_as_good_as_with_the_true_surface_also_quick_ones(
         truth = to_bytes(pinhole_picture(knot, view))
         images = (
             synthesise(tiles, view).image,
-            synthesise(tiles, view, "blend", depth_along_rays(knot)).image,
+            synthesise(tiles, view, depth_along_rays(knot)).image,
             fine.of(view)[0].image,
             quick.of(view)[0].image,
         )

@@ -67,7 +67,7 @@ def test_views_are_those_of_the_library(
     assert data_of(page)["kind"] == KIND
     view = Query(azimuth=180, elevation=60, width=160, height=120).camera(CAPTURE_MM)
     images = {
-        "nearest": synthesise(tiles, view, "nearest").image,
+        "nearest": synthesise(tiles, view).image,
         "depth": depth_views(tiles, QUICK).of(view)[0].image,
     }
     errors = {name: error(file, 1, 2, image) for name, image in images.items()}

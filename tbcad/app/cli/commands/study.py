@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tbcad.core.spec.design import Spec
     from tbcad.light.simulate.capture.photograph import Sensor
     from tbcad.light.simulate.scene.object import SceneObject
-    from tbcad.light.simulate.views.viewpoints import StudyMethod
+    from tbcad.light.simulate.views.viewpoints import ViewMethod
 
 study = typer.Typer(
     no_args_is_help=True,
@@ -229,12 +229,12 @@ def calibration_command(folder: Path) -> Work:
     return partial(calibration_study, export)
 
 
-def _by(method: MethodOfStudy) -> "StudyMethod":
-    if method != "field":
-        return method
+def _by(method: MethodOfStudy) -> "ViewMethod":
+    from tbcad.light.depth.depth_map import BY_DEPTH
     from tbcad.light.reconstruction.picture import BY_FIELD
+    from tbcad.light.simulate.views.viewpoints import BY_NEAREST
 
-    return BY_FIELD
+    return {by.name: by for by in (BY_NEAREST, BY_DEPTH, BY_FIELD)}[method]
 
 
 def _subject(

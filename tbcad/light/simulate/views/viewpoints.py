@@ -15,7 +15,7 @@ from tbcad.light.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import GOLDEN_ANGLE, pinhole_picture
-from tbcad.light.simulate.views.synthesis import Method, synthesise
+from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.types import Bools, Bytes, Floats, Progress
 
 # Blurs that are tried, standard deviations of a Gaussian in pixels, and how finely.
@@ -103,10 +103,10 @@ def equivalent_blur_px(truth: Bytes, picture: Bytes) -> float:
 
 
 @dataclass(frozen=True)
-class OwnMethod:
-    """How views are made, by a room above this one."""
+class ViewMethod:
+    """How the views of a light field are made."""
 
-    name: str  # of the method
+    name: str
     # of a light field: what makes the picture (h, w, 3) of a camera
     views: Callable[[LightField], Callable[[Camera], Bytes]]
 
@@ -114,7 +114,12 @@ class OwnMethod:
         return self.name
 
 
-StudyMethod = Method | OwnMethod
+def _nearest(source: LightField) -> Callable[[Camera], Bytes]:
+    tiles = MirrorTiles(source)
+    return lambda view: synthesise(tiles, view).image
+
+
+BY_NEAREST = ViewMethod("nearest", _nearest)
 
 
 @dataclass(frozen=True)
@@ -187,24 +192,15 @@ def object_masks(scene: Scene, views: list[Camera]) -> list[Bools]:
     return masks
 
 
-def views_by(method: StudyMethod, tiles: MirrorTiles, scene: Scene) -> Callable[[Camera], Bytes]:
-    """What makes the picture (h, w, 3) of a camera; a blend takes the depth of the scene."""
-    if isinstance(method, OwnMethod):
-        return method.views(tiles.source)
-    depth = depth_along_rays(scene) if method == "blend" else None
-    return lambda view: synthesise(tiles, view, method, depth).image
-
-
 def view_quality(
-    tiles: MirrorTiles,
+    picture_of: Callable[[Camera], Bytes],
     scene: Scene,
     views: list[Camera],
     truths: list[Bytes],
-    method: StudyMethod,
     progress: Progress,
 ) -> dict[str, Floats]:
-    """The light field's views against the truth at each viewpoint: QUALITY, each (v,)."""
-    picture_of, masks, qualities = views_by(method, tiles, scene), object_masks(scene, views), []
+    """Views against the truth at each viewpoint: QUALITY, each (v,)."""
+    masks, qualities = object_masks(scene, views), []
     for k, (view, truth, mask) in enumerate(zip(views, truths, masks, strict=True)):
         progress(f"view {k + 1} of {len(views)}")
         qualities.append(picture_quality(view, truth, picture_of(view), mask))
