@@ -24,11 +24,7 @@ from tbcad.light.reconstruction.picture import STRIDE, field_picture
 from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import ThinLens, lens_pinholes, refocus
-from tbcad.light.simulate.views.synthesis import (
-    horizon_search_radius,
-    search_radius,
-    synthesise,
-)
+from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.viewer.moving import moving_view
 from tbcad.light.viewer.page import Query, filled
 from tbcad.output.single_files import check_file
@@ -108,9 +104,8 @@ def light_field_renderer(
 ) -> Renderer:
     """Of a light field, whose file stays open: makes the pictures of all its virtual cameras."""
     pictures, reach = pinhole_pictures(tiles.source, progress), tiles.source.capture_mm
-    limits = search_radius(tiles), horizon_search_radius(tiles)
     rest = _synthesised(tiles, method, lambda: DepthViews(tiles, pictures))
-    return Renderer(method, tiles, reach, rest, lambda at: moving_view(pictures, at, limits))
+    return Renderer(method, tiles, reach, rest, lambda at: moving_view(pictures, at))
 
 
 def field_renderer(made: Field, lens: MirrorTiles | None = None) -> Renderer:
