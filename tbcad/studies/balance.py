@@ -16,16 +16,16 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import traced_light_field
 from tbcad.light.simulate.capture.photograph import Sensor, count_pixels, virtual_cameras
 from tbcad.light.simulate.scene.object import patterned_ball
-from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.views.viewpoints import (
     ViewMethod,
-    ground_truths,
+    ViewTargets,
     image_quality_map,
-    object_masks,
+    pinhole_targets,
     viewpoints_over_hemisphere,
 )
 from tbcad.studies.paper import MAX_N, notes, try_design, with_lens_of_table_i
-from tbcad.types import Bools, Bytes, Progress
+from tbcad.types import Progress
 
 SUBDIVISIONS = (6, 9, 12, 15, 18, 22, 27, 33)
 NEAR, FAR = 0.3, 0.98  # radius of the ball, in that of the capture sphere
@@ -43,9 +43,7 @@ class Subject:
 
     surface: str  # "matt" or "glossy"
     radius_mm: float  # of the ball
-    scene: Scene  # the ball
-    truths: list[Bytes]  # from each viewpoint, (h, w, 3)
-    masks: list[Bools]  # where they show it, (h, w)
+    seen: ViewTargets  # from each viewpoint
 
     @property
     def name(self) -> str:
@@ -78,7 +76,7 @@ def balance(
     viewpoints = viewpoints_over_hemisphere(views, distance_mm)
     cameras = viewpoints.cameras(spec.optics.capture_diameter_mm)
     seen = subjects(spec.optics.capture_diameter_mm, cameras, progress)
-    records = [one for n in ns for one in _of_n(spec, n, seen, cameras, method, progress)]
+    records = [one for n in ns for one in _of_n(spec, n, seen, method, progress)]
     table = Table.of_records("balance", records, (f"Method: {method}.", *notes("balance")), COLUMNS)
     best = [one for subject in seen for one in _best(table, subject)]
     panels = (_panel(table, seen, method),)
@@ -93,20 +91,13 @@ def subjects(capture_mm: float, cameras: list[Camera], progress: Progress) -> li
     for share in (NEAR, FAR):
         radius = round(share * capture_mm / 2, 2)
         matt = prepared_scene(patterned_ball(radius))
-        masks = object_masks(matt, cameras)
         for surface, scene in (("matt", matt), ("glossy", replace(matt, gloss=GLOSS))):
-            truths = ground_truths(scene, cameras, progress)
-            result.append(Subject(surface, radius, scene, truths, masks))
+            result.append(Subject(surface, radius, pinhole_targets(scene, cameras, progress)))
     return result
 
 
 def _of_n(
-    spec: Spec,
-    n: int,
-    seen: list[Subject],
-    cameras: list[Camera],
-    method: ViewMethod,
-    progress: Progress,
+    spec: Spec, n: int, seen: list[Subject], method: ViewMethod, progress: Progress
 ) -> list[Record]:
     """A row for each object, or for what a refusal of the design says."""
     attempt = try_design(spec, optics={"n": n})
@@ -117,7 +108,7 @@ def _of_n(
     rows: list[Record] = []
     for one in seen:
         progress(f"n = {n}: {one.name}")
-        value = ssim_on_object(attempt.design, one, cameras, method)
+        value = ssim_on_object(attempt.design, one.seen, method)
         own: Record = {"surface": one.surface, "radius_mm": one.radius_mm, "ssim_on_object": value}
         rows.append({**head, **own})
     return rows
@@ -131,14 +122,12 @@ def _counts(design: MirrorDesign) -> Record:
     return {"virtual_cameras": number, "pixels": float(2 * counts.seen.sum() / number)}
 
 
-def ssim_on_object(
-    design: MirrorDesign, subject: Subject, cameras: list[Camera], method: ViewMethod
-) -> float:
+def ssim_on_object(design: MirrorDesign, seen: ViewTargets, method: ViewMethod) -> float:
     """Mean local SSIM where the object is, over all views."""
-    view = method.views(traced_light_field(design, subject.scene))
+    view = method.views(traced_light_field(design, seen.scene))
     values = [
         image_quality_map(truth, view(at))[1][mask].mean()
-        for at, truth, mask in zip(cameras, subject.truths, subject.masks, strict=True)
+        for at, truth, mask in zip(seen.cameras, seen.truths, seen.masks, strict=True)
     ]
     return float(np.mean(values))
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -171,46 +172,50 @@ def viewpoints_over_hemisphere(count: int, distance_mm: float) -> Viewpoints:
     return Viewpoints(elevation, np.degrees(GOLDEN_ANGLE * step) % 360, distance_mm)
 
 
-def ground_truths(scene: Scene, views: list[Camera], progress: Progress) -> list[Bytes]:
-    """What a real camera would see from each viewpoint, (h, w, 3)."""
+@dataclass(frozen=True)
+class ViewTargets:
+    """What real cameras would see of a scene."""
+
+    scene: Scene
+    cameras: list[Camera]
+    truths: list[Bytes]  # from each, (h, w, 3)
+
+    @cached_property
+    def masks(self) -> list[Bools]:
+        """Which pixels of each camera's picture show the object, (h, w)."""
+        depth, masks = depth_along_rays(self.scene), []
+        for view in self.cameras:
+            direction = view_directions(view)
+            origin = np.broadcast_to(view.pinhole, direction.shape)
+            distance = depth(origin.reshape(-1, 3), direction.reshape(-1, 3))
+            masks.append(np.isfinite(distance).reshape(direction.shape[:2]))
+        return masks
+
+    def quality(
+        self, picture_of: Callable[[Camera], Bytes], progress: Progress
+    ) -> dict[str, Floats]:
+        """Pictures (h, w, 3) against the truth from each camera: QUALITY, each (v,)."""
+        rows = []
+        for k, view in enumerate(self.cameras):
+            progress(f"view {k + 1} of {len(self.cameras)}")
+            rows.append(_quality(view, self.truths[k], picture_of(view), self.masks[k]))
+        return dict(zip(QUALITY, np.array(rows).T, strict=True))
+
+
+def pinhole_targets(
+    scene: Scene, cameras: list[Camera], progress: Progress = lambda _: None
+) -> ViewTargets:
+    """What pinhole cameras would see, ray-traced."""
     truths = []
-    for k, view in enumerate(views):
-        progress(f"truth {k + 1} of {len(views)}")
+    for k, view in enumerate(cameras):
+        progress(f"truth {k + 1} of {len(cameras)}")
         truths.append(to_bytes(pinhole_picture(scene, view)))
-    return truths
+    return ViewTargets(scene, cameras, truths)
 
 
-def object_masks(scene: Scene, views: list[Camera]) -> list[Bools]:
-    """Which pixels of each viewpoint's picture show the object, (h, w)."""
-    depth = depth_along_rays(scene)
-    masks = []
-    for view in views:
-        direction = view_directions(view)
-        origin = np.broadcast_to(view.pinhole, direction.shape)
-        distance = depth(origin.reshape(-1, 3), direction.reshape(-1, 3))
-        masks.append(np.isfinite(distance).reshape(direction.shape[:2]))
-    return masks
-
-
-def view_quality(
-    picture_of: Callable[[Camera], Bytes],
-    scene: Scene,
-    views: list[Camera],
-    truths: list[Bytes],
-    progress: Progress,
-) -> dict[str, Floats]:
-    """Views against the truth at each viewpoint: QUALITY, each (v,)."""
-    masks, qualities = object_masks(scene, views), []
-    for k, (view, truth, mask) in enumerate(zip(views, truths, masks, strict=True)):
-        progress(f"view {k + 1} of {len(views)}")
-        qualities.append(picture_quality(view, truth, picture_of(view), mask))
-    return {name: np.array([quality[name] for quality in qualities]) for name in QUALITY}
-
-
-def picture_quality(view: Camera, truth: Bytes, picture: Bytes, mask: Bools) -> dict[str, float]:
+def _quality(view: Camera, truth: Bytes, picture: Bytes, mask: Bools) -> tuple[float, ...]:
     """QUALITY of one view; `mask` (h, w): where the truth shows the object."""
     quality, about = image_quality_map(truth, picture)
     blur_mm = equivalent_blur_px(truth, picture) * view.pixel_pitch * float(norm(view.pinhole))
     on_object = float(about[mask].mean()) if mask.any() else np.nan
-    values = (quality.psnr_db, quality.ssim, on_object, blur_mm, float(mask.mean()))
-    return dict(zip(QUALITY, values, strict=True))
+    return quality.psnr_db, quality.ssim, on_object, blur_mm, float(mask.mean())
