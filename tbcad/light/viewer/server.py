@@ -8,7 +8,6 @@ missing, or the host is not ours.
 import secrets
 import sys
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from threading import BoundedSemaphore
 from typing import Any
 
 from tbcad.errors import InputError
@@ -21,7 +20,6 @@ TOKEN_BYTES = 16
 # A connection is closed when nothing of its next request comes, or of an answer is taken, for so
 # many seconds.
 TIMEOUT_S = 60.0
-MAX_CONNECTIONS = 64  # of which a browser opens six
 HEADERS = {
     "Cache-Control": "no-store",
     "Referrer-Policy": "no-referrer",
@@ -39,7 +37,6 @@ class ViewServer(ThreadingHTTPServer):
 
     daemon_threads = True
     allow_reuse_address = False
-    request_queue_size = MAX_CONNECTIONS
 
     def __init__(self, renderer: Renderer, title: str, start: Query, port: int = 0) -> None:
         """Listen on this computer alone, at a port, 0 for any; InputError if it is taken."""
@@ -49,7 +46,6 @@ class ViewServer(ThreadingHTTPServer):
         )
         self.page = page.encode("utf-8")
         self.token = secrets.token_urlsafe(TOKEN_BYTES)
-        self._free = BoundedSemaphore(MAX_CONNECTIONS)
         try:
             super().__init__((HOST, port), _Handler)
         except OSError as error:
@@ -64,20 +60,6 @@ class ViewServer(ThreadingHTTPServer):
     def hosts(self) -> tuple[str, ...]:
         """What a browser that was given the address calls this server."""
         return tuple(f"{name}:{self.server_port}" for name in NAMES)
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Serve a connection in a thread of its own, or close it when there are too many."""
-        if self._free.acquire(blocking=False):
-            super().process_request(request, client_address)
-        else:
-            self.shutdown_request(request)
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Serve a connection to its end."""
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self._free.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing of a connection that its client breaks off: only faults of ours are shown."""

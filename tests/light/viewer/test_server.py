@@ -4,7 +4,6 @@ import socket
 import struct
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack
 from http.client import HTTPConnection, HTTPResponse
 from io import BytesIO
 
@@ -18,7 +17,7 @@ from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import ThinLens, refocus
 from tbcad.light.viewer.page import Query, limits, parse_query
 from tbcad.light.viewer.render import Renderer
-from tbcad.light.viewer.server import HOST, MAX_CONNECTIONS, ViewServer
+from tbcad.light.viewer.server import HOST, ViewServer
 
 CAPTURE_MM = 60.0
 SMALL = "width=160&height=120"
@@ -186,13 +185,6 @@ def everything(connection: socket.socket) -> bytes:
         return file.read()
 
 
-def all_are_served(server: ViewServer) -> None:
-    """Wait until no connection is served any more: then all that could be printed is."""
-    for _ in range(MAX_CONNECTIONS):
-        assert server._free.acquire(timeout=600)
-    server._free.release(MAX_CONNECTIONS)
-
-
 @pytest.mark.parametrize(
     "sent",
     [b"", b"GE", b"GET / HTTP/1.1\r\nHost: x\r\n", "page", "view", b"\0\xff\xfe" * 9 + b"\r\n\r\n"],
@@ -204,18 +196,15 @@ def test_a_client_that_resets_is_no_error(
         path = f"/{server.token}/" + (f"view?{SMALL}" if sent == "view" else "")
         sent = head(server, path)
     reset(raw(server, sent))
-    all_are_served(server)
-    assert capfd.readouterr() == ("", "")
     assert get(server, f"/{server.token}/")[0].status == 200
+    assert capfd.readouterr() == ("", "")
 
 
-def test_a_client_that_takes_no_answer_is_let_go(
+def test_a_client_that_sends_nothing_is_let_go(
     server: ViewServer, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("tbcad.light.viewer.server._Handler.timeout", 0.2)
-    monkeypatch.setattr(server, "page", bytes(50_000_000))  # more than the system keeps
-    with raw(server, head(server, f"/{server.token}/")):
-        all_are_served(server)
+    assert everything(raw(server, b"GET")) == b""
     assert capfd.readouterr() == ("", "")
 
 
@@ -229,12 +218,3 @@ def test_what_follows_a_request_with_a_body_is_no_request(server: ViewServer) ->
     body = head(server, f"/{server.token}/")
     connection = raw(server, head(server, "/", f"Content-Length: {len(body)}") + body)
     assert everything(connection).count(b"HTTP/1.1") == 1
-
-
-def test_more_connections_than_are_allowed_are_closed(server: ViewServer) -> None:
-    with ExitStack() as stack:
-        for _ in range(MAX_CONNECTIONS):
-            stack.enter_context(raw(server, b"GET"))
-        assert everything(raw(server, b"")) == b""
-    all_are_served(server)
-    assert get(server, f"/{server.token}/")[0].status == 200
