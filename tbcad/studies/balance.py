@@ -12,7 +12,6 @@ from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import Spec
-from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import traced_light_field
 from tbcad.light.simulate.capture.photograph import Sensor, count_pixels, virtual_cameras
 from tbcad.light.simulate.scene.object import patterned_ball
@@ -24,7 +23,7 @@ from tbcad.light.simulate.views.viewpoints import (
     pinhole_targets,
     viewpoints_over_hemisphere,
 )
-from tbcad.studies.paper import MAX_N, notes, try_design, with_lens_of_table_i
+from tbcad.studies.paper import notes, try_design, with_lens_of_table_i
 from tbcad.types import Progress
 
 SUBDIVISIONS = (6, 9, 12, 15, 18, 22, 27, 33)
@@ -49,18 +48,6 @@ class Subject:
     def name(self) -> str:
         """For legends."""
         return f"{self.surface}, {self.radius_mm:g} mm from the reference plane"
-
-
-def parse_subdivisions(given: list[int] | None) -> tuple[int, ...]:
-    """Subdivisions n in ascending order, each once; by default SUBDIVISIONS.
-
-    InputError: no design has one of them.
-    """
-    ns = tuple(sorted(set(given or SUBDIVISIONS)))
-    if ns[0] < 2 or ns[-1] > MAX_N:
-        wrong = ns[0] if ns[0] < 2 else ns[-1]
-        raise InputError(f"--n is {wrong}, allowed is 2 to {MAX_N}: change it")
-    return ns
 
 
 def balance(

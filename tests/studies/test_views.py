@@ -10,7 +10,6 @@ from scipy.stats import ttest_rel
 from tbcad.common.results import Study, study_files
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.load import load_spec
-from tbcad.errors import InputError
 from tbcad.light.simulate.capture.photograph import Sensor
 from tbcad.light.simulate.scene.object import built_in_object, patterned_ball
 from tbcad.light.simulate.scene.ray_casting import LAMPS, cast_rays, prepared_scene
@@ -21,7 +20,7 @@ from tbcad.light.simulate.views.viewpoints import (
     viewpoints_around,
     viewpoints_over_hemisphere,
 )
-from tbcad.studies.balance import SUBDIVISIONS, balance, parse_subdivisions
+from tbcad.studies.balance import balance
 from tbcad.studies.low_pass import BlurOptions, low_pass
 from tbcad.studies.paper import balanced_sensors
 from tbcad.studies.ssim import (
@@ -138,8 +137,6 @@ def test_viewpoints_around_the_object() -> None:
     at = np.array([view.pinhole for view in viewpoints.cameras(60.0)])
     assert np.linalg.norm(at, axis=1) == pytest.approx(np.full(8, 500.0))
     assert at[4:, 2] == pytest.approx(np.full(4, 500 * np.sqrt(0.5)))
-    with pytest.raises(InputError, match="--azimuths 0"):
-        viewpoints_around((0.0,), 0, 500.0)
 
 
 @pytest.mark.slow
@@ -182,17 +179,6 @@ def test_a_highlight_moves_with_the_viewpoint_and_is_where_light_is_mirrored() -
     assert brighter[hit & (angle < np.radians(3)) & (plain.colour.min(axis=1) < 150)].all()
 
 
-def test_what_is_refused() -> None:
-    for wrong in (BlurOptions((0.0,)), BlurOptions(lens_px=(np.nan,))):
-        with pytest.raises(InputError, match=r"--(filter-px 0|lens-px nan)"):
-            wrong.checked()
-    assert parse_subdivisions(None) == SUBDIVISIONS
-    assert parse_subdivisions([9, 4, 9]) == (4, 9)
-    for number in (1, 61):
-        with pytest.raises(InputError, match=f"--n is {number}, allowed is 2 to 60"):
-            parse_subdivisions([4, number])
-
-
 def test_viewpoints_are_even_over_the_hemisphere() -> None:
     """As many on each belt of equal area: of equal height (Archimedes)."""
     views = viewpoints_over_hemisphere(200, 640.0)
@@ -201,5 +187,3 @@ def test_viewpoints_are_even_over_the_hemisphere() -> None:
     quarter, _ = np.histogram(views.azimuth_deg, 4, (0, 360))
     assert np.ptp(quarter) <= 4
     assert np.abs(np.sin(2 * np.radians(views.azimuth_deg[:50]))).min() > 0.01
-    with pytest.raises(InputError, match="--views 0: allowed is 1 to 1000"):
-        viewpoints_over_hemisphere(0, 640.0)

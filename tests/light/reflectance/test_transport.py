@@ -141,15 +141,6 @@ def test_rays_to_where_a_sphere_reflects_come_to_the_points_and_spread_as_said()
         assert np.linalg.norm(np.cross(first, second)) == pytest.approx(area, rel=1e-6)
 
 
-def test_head_on_it_is_the_light_of_the_image_behind_the_mirror() -> None:
-    """A convex mirror's image of a point: 1/image = 1/distance + 2/radius."""
-    far, near = 240.0, 80.0
-    pinhole, centre = np.array([0.0, 0, far]), np.array([0.0, 0, -RADIUS])
-    _, spread = reflected(centre, RADIUS, pinhole, np.array([[0.0, 0, near]]))
-    image = 1 / (1 / far + 2 / RADIUS)
-    assert spread == pytest.approx([(far / image * (image + near)) ** 2])
-
-
 def flat_mirror(owner: int) -> MirrorPixels:
     """The plane z = 60 over the origin; all pixels belong to one mirror."""
     radius = 1 / LEAST_CURVATURE

@@ -9,7 +9,6 @@ import numpy as np
 
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
-from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import to_bytes
 from tbcad.light.simulate.scene.ray_casting import Scene, depth_along_rays
@@ -24,7 +23,6 @@ BLUR_RANGE_PX = (0.05, 20.0)
 BLUR_STEP_PX = 0.01
 SSIM_SIGMA, SSIM_RADIUS = 1.5, 5  # of SSIM's window, pixels
 ELEVATIONS_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
-MAX_AZIMUTHS, MAX_VIEWS = 360, 1000
 # What is measured of a view: SSIM over the frame and where the object is; standard deviation of
 # the Gaussian that blurs the truth as the view is blurred, at the object's centre; object's share.
 QUALITY = ("psnr_db", "ssim", "ssim_on_object", "blur_mm", "object_share")
@@ -147,26 +145,14 @@ class Viewpoints:
 def viewpoints_around(
     elevations_deg: tuple[float, ...], azimuths: int, distance_mm: float
 ) -> Viewpoints:
-    """Viewpoints at some elevations, and at each a number of azimuths evenly around the object.
-
-    InputError: there are none or too many.
-    """
-    if not 1 <= azimuths <= MAX_AZIMUTHS:
-        raise InputError(
-            f"--azimuths {azimuths}: allowed is 1 to {MAX_AZIMUTHS} viewpoints around the object"
-        )
+    """Viewpoints at some elevations, and at each a number of azimuths evenly around the object."""
     around = np.arange(azimuths) * 360.0 / azimuths
     elevation, azimuth = (x.ravel() for x in np.meshgrid(elevations_deg, around, indexing="ij"))
     return Viewpoints(elevation, azimuth, distance_mm)
 
 
 def viewpoints_over_hemisphere(count: int, distance_mm: float) -> Viewpoints:
-    """Viewpoints evenly over the hemisphere, in no plane of symmetry (Vogel's spiral).
-
-    InputError: there are none or too many.
-    """
-    if not 1 <= count <= MAX_VIEWS:
-        raise InputError(f"--views {count}: allowed is 1 to {MAX_VIEWS} viewpoints")
+    """Viewpoints evenly over the hemisphere, in no plane of symmetry (Vogel's spiral)."""
     step = np.arange(count) + 0.5
     elevation = np.degrees(np.arcsin(step / count))
     return Viewpoints(elevation, np.degrees(GOLDEN_ANGLE * step) % 360, distance_mm)
