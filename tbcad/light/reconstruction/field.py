@@ -152,8 +152,9 @@ def write_field(path: Path, made: Field) -> None:
     replace_files(path.parent, {path.name: field_bytes(made)})
 
 
-def field_bytes(made: Field) -> bytes:
-    """The file of a field."""
+def field_bytes(made: Field, **more: Singles) -> bytes:
+    """The file of a field; with more arrays, of one under way, not compressed."""
+    save = np.savez if more else np.savez_compressed
     arrays = {
         "schema": np.array(SCHEMA),
         "nodes": np.array(made.grid.n),
@@ -166,7 +167,7 @@ def field_bytes(made: Field) -> bytes:
     if made.order:
         arrays["slope"] = made.values[:, MATT:]
     with BytesIO() as buffer:
-        np.savez_compressed(buffer, allow_pickle=False, **arrays)
+        save(buffer, allow_pickle=False, **arrays, **more)
         return buffer.getvalue()
 
 
@@ -178,8 +179,7 @@ def read_field(path: Path) -> Field:
         with zipfile.ZipFile(path) as archive:
             if sum(one.file_size for one in archive.infolist()) > MOST_BYTES:
                 raise ValueError("it unpacks to more than 4 GB")
-        with np.load(path, allow_pickle=False) as store:
-            return _checked({name: store[name] for name in store.files})
+        return read_arrays(path)[0]
     except InputError:
         raise
     except Exception as fault:  # zip and numpy raise many kinds
@@ -187,6 +187,13 @@ def read_field(path: Path) -> Field:
             f"{path} is no field that tbcad wrote ({fault}): write it again with "
             "`tbcad reconstruct`"
         ) from None
+
+
+def read_arrays(path: Path) -> tuple[Field, dict[str, Any]]:
+    """A field and all arrays of its file; ValueError, and what zip and numpy raise: damaged."""
+    with np.load(path, allow_pickle=False) as store:
+        arrays = {name: store[name] for name in store.files}
+    return _checked(arrays), arrays
 
 
 def _checked(arrays: dict[str, Any]) -> Field:
