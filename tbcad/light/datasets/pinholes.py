@@ -205,9 +205,10 @@ def write_ngp_rays(
 
 def rays_file(crop: Crop, pinhole: LensCamera) -> bytes:
     """24 bytes a pixel; a pixel that is not used has the ray of the pinhole."""
-    known, pixels = crop.meets[..., None], np.indices(crop.meets.shape)[::-1]
+    known, (row, column) = crop.meets[..., None], np.indices(crop.meets.shape)
+    directions = pinhole.directions(np.stack([column, row], axis=-1).astype(np.float64))
     origin = np.where(known, crop.origin, pinhole.pinhole)
-    direction = np.where(known, crop.direction, pinhole.directions(np.moveaxis(pixels, 0, -1)))
+    direction = np.where(known, crop.direction, directions)
     return np.concatenate([origin, direction], axis=2).astype("<f4").tobytes()
 
 

@@ -61,7 +61,7 @@ class Grid:
     @staticmethod
     def about(wanted: Bools, width_mm: float) -> "Grid":
         """The nodes of all cells that have a wanted node (n, n, n)."""
-        nodes = ndimage.binary_dilation(wanted, np.ones((3, 3, 3)))
+        nodes = ndimage.binary_dilation(wanted, np.ones((3, 3, 3), dtype=bool))
         return Grid(len(wanted), width_mm, np.argwhere(nodes).astype(np.uint16))
 
     def __len__(self) -> int:
@@ -86,7 +86,7 @@ class Grid:
         0 where it has them itself.
         """
         corners = np.lib.stride_tricks.sliding_window_view(self.row >= 0, (2, 2, 2))
-        whole = corners.all(axis=(3, 4, 5))
+        whole: Bools = np.asarray(corners.all(axis=(3, 4, 5)))
         if not whole.any():
             return np.full(whole.shape, LONGEST_LEAP, dtype=np.uint8)
         away = ndimage.distance_transform_cdt(~whole, "chessboard")
