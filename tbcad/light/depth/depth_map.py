@@ -71,10 +71,6 @@ class DepthMap:
         """Depth (h, w), NaN where no plane stands out as well."""
         return np.where(self.confidence > MIN_CONFIDENCE, self.depth, np.nan)
 
-    def points(self) -> Floats:
-        """Points (h, w, 3) of the surface, mm; NaN where it is not known."""
-        return depth_points(self.view, self.known())
-
     def png(self) -> bytes:
         """The depth as a PNG of 16 bits: 1 at the capture sphere's back, 65535 at its front."""
         return depth_png(self.known(), self.capture_mm)

@@ -135,19 +135,14 @@ def write_preview(file: Path, made: Field) -> None:
     write_images({file: field_picture(made, at).image})
 
 
-def quick_field(source: LightField) -> Field:
-    """Fit a coarse field to all rays of a light field.
+def quick_views(source: LightField) -> Callable[[Camera], Bytes]:
+    """What makes the picture (h, w, 3) of a camera from a coarse field, fitted to all rays.
 
     InputError: none of them meets the capture sphere.
     """
     with _one_at_a_time:
         *_, last = fit(captured_rays(source), QUICK)
-    return last.field()
-
-
-def quick_views(source: LightField) -> Callable[[Camera], Bytes]:
-    """What makes the picture (h, w, 3) of a camera from a coarse field."""
-    made = quick_field(source)
+    made = last.field()
     return lambda camera: field_picture(made, camera).image
 
 

@@ -14,7 +14,7 @@ from tbcad.core.spec.load import load_spec
 from tbcad.errors import InputError
 from tbcad.light.datasets.pictures import PinholePictures, pinhole_pictures
 from tbcad.light.datasets.virtual_cameras import camera_at
-from tbcad.light.depth.depth_map import DepthMap, depth_map, depth_views
+from tbcad.light.depth.depth_map import DepthMap, depth_map, depth_points, depth_views
 from tbcad.light.depth.plane_sweep import QUICK, swept_depth
 from tbcad.light.simulate.capture.light_field import light_field_in_memory
 from tbcad.light.simulate.capture.photograph import photograph, to_bytes
@@ -56,7 +56,7 @@ def flat(depth: float) -> DepthMap:
 
 def test_rays_points_and_the_picture_meet_the_surface() -> None:
     found = flat(-7.0)
-    points = found.points()
+    points = depth_points(found.view, found.known())
     assert np.isnan(points[0, 0]).all()
     rest = points[1:].reshape(-1, 3)
     assert rest @ VIEW.forward == pytest.approx(np.full(len(rest), -7.0))
