@@ -208,12 +208,6 @@ def test_a_client_that_sends_nothing_is_let_go(
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_client_that_has_sent_all_gets_its_answer(server: ViewServer) -> None:
-    connection = raw(server, head(server, f"/{server.token}/"))
-    connection.shutdown(socket.SHUT_WR)
-    assert everything(connection).startswith(b"HTTP/1.1 200")
-
-
 def test_what_follows_a_request_with_a_body_is_no_request(server: ViewServer) -> None:
     body = head(server, f"/{server.token}/")
     connection = raw(server, head(server, "/", f"Content-Length: {len(body)}") + body)

@@ -75,13 +75,6 @@ def test_views_are_those_of_the_library(
     assert min(errors, key=lambda name: errors[name]) == method
 
 
-def test_the_same_views_give_the_same_file(tiles: MirrorTiles, tmp_path: Path) -> None:
-    files = [tmp_path / name for name in ("a.html", "b.html")]
-    for file in files:
-        write_turntable(file, tiles, TABLE, "knot", lambda _: None)
-    assert files[0].read_bytes() == files[1].read_bytes()
-
-
 def test_pictures_lose_detail_until_they_fit() -> None:
     noise = np.random.default_rng(1).integers(0, 256, (1, 4, 120, 160, 3), dtype=np.uint8)
     pictures = [list(row) for row in noise]
@@ -123,12 +116,6 @@ def test_a_page_has_sliders_of_a_lens_where_there_is_one(tiles: MirrorTiles, len
     assert (data_of(page)["method"], data_of(page)["lens"]) == ("field", lens)
     assert f"<title>ball: {'light field' if lens else 'field'}</title>" in page
     assert "{{" not in page
-
-
-def test_a_turntable_of_a_field(tmp_path: Path) -> None:
-    write_turntable(tmp_path / "ball.html", ball(), TABLE, "ball", lambda _: None)
-    camera = Query(azimuth=90, elevation=20, width=160, height=120).camera(CAPTURE_MM)
-    assert error(tmp_path / "ball.html", 0, 1, field_picture(ball(), camera).image) < 3
 
 
 def test_views_in_python() -> None:
