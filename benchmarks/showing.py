@@ -28,7 +28,7 @@ from tbcad.light.viewer.page import Query
 from tbcad.light.viewer.render import Renderer, field_renderer, light_field_renderer
 from tbcad.light.viewer.server import HOST, ViewServer
 
-Method = Literal["nearest", "blend", "depth"]
+Method = Literal["nearest", "depth"]
 VIEWS = 90  # once around, in steps of 4 degrees
 IN_FLIGHT = 2  # as the page
 BROWSER_S = 5.0
@@ -42,7 +42,6 @@ def synthesised(capture: Path, rounds: int) -> list[Row]:
         views, fine = Views(source, quick=True), Views(source)
         works: dict[str, tuple[Views, Method, float | None]] = {
             "nearest rays": (views, "nearest", 30),
-            "blend on the plane": (views, "blend", 10),
             "blend at the depth found, quick": (views, "depth", 10),
             "blend at the depth found": (fine, "depth", None),
         }

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from timing import Figure, Row, Spent, Work, at_least, at_most, measured, spent_in_turns
 
 from tbcad.core.optics.camera import Camera
+from tbcad.light.depth.depth_map import depth_views
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import photograph
 from tbcad.light.simulate.image_files import write_images
@@ -75,7 +76,7 @@ def views(capture: Path, rounds: int) -> list[Row]:
         every = all_rays(source, at)
         works: list[Work] = [
             partial(synthesise, tiles, at),
-            partial(synthesise, tiles, at, "blend"),
+            partial(depth_views(tiles).of, at),
             lambda: synthesise(MirrorTiles(source), at),
             every.points,
             partial(cKDTree, every.points()),
@@ -96,7 +97,7 @@ def _views(nearest: Spent, blend: Spent, first: Spent) -> list[Row]:
         at_most("view, 640 x 480, nearest rays", nearest.seconds, 0.1, "s"),
         measured(BOTH, nearest.cpu, "s"),
         measured("- the first of an open light field", first.seconds, "s"),
-        measured("view, 640 x 480, blend", blend.seconds, "s"),
+        measured("view, 640 x 480, at the depth found", blend.seconds, "s"),
         measured(BOTH, blend.cpu, "s"),
     ]
 

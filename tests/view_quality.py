@@ -20,5 +20,5 @@ def mean_ssim(tiles: MirrorTiles, scene: Scene) -> float:
     for azimuth, elevation in np.radians(THREE_SIDES_DEG):
         at = camera_around_object(azimuth, elevation, DISTANCE_MM, CAPTURE_MM, SIZE_PX, None)
         truth = np.rint(pinhole_picture(scene, at)).astype(np.uint8)
-        found.append(image_quality(truth, synthesise(tiles, at, "nearest", None).image).ssim)
+        found.append(image_quality(truth, synthesise(tiles, at).image).ssim)
     return float(np.mean(found))

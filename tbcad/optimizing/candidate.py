@@ -17,7 +17,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from tbcad.cad.formats.checked_files import parse_json
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import FIT, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
@@ -25,16 +24,16 @@ from tbcad.light.reconstruction.picture import BY_FIELD
 from tbcad.light.simulate.capture.light_field import traced_light_field
 from tbcad.light.simulate.capture.photograph import virtual_camera_pixels
 from tbcad.light.simulate.scene.object import built_in_object
-from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.views.viewpoints import (
+    BY_NEAREST,
     ELEVATIONS_DEG,
-    ground_truths,
+    ViewTargets,
     image_quality,
+    pinhole_targets,
     viewpoints_around,
-    views_by,
 )
-from tbcad.types import Bytes, Floats
+from tbcad.types import Bytes, Floats, Ints
 
 AZIMUTHS, DISTANCE_MM = 4, 640.0
 
@@ -52,30 +51,21 @@ Place = tuple[float, float, float, float, float]
 SCHEMA = "tbcad-candidates/2"
 
 
-@dataclass(frozen=True)
-class Truth:
-    """What real cameras would see of the built-in object."""
-
-    scene: Scene
-    cameras: list[Camera]
-    pictures: list[Bytes]  # from each, (h, w, 3)
-
-
 def mean_ssim(design: MirrorDesign, method: ViewsBy = "nearest") -> float:
     """Mean SSIM of views over the frame, from the stated viewpoints."""
     with _one_at_a_time:
         truth = _truth(design.spec.optics.capture_diameter_mm)
-    tiles = MirrorTiles(traced_light_field(design, truth.scene))
-    picture_of = views_by(BY_FIELD if method == "field" else method, tiles, truth.scene)
-    views = zip(truth.cameras, truth.pictures, strict=True)
+    by = BY_FIELD if method == "field" else BY_NEAREST
+    picture_of = by.views(traced_light_field(design, truth.scene))
+    views = zip(truth.cameras, truth.truths, strict=True)
     return float(np.mean([image_quality(real, picture_of(at)).ssim for at, real in views]))
 
 
 @cache
-def _truth(capture_mm: float) -> Truth:
-    scene = prepared_scene(built_in_object(capture_mm))
+def _truth(capture_mm: float) -> ViewTargets:
+    """What real cameras would see of the built-in object."""
     cameras = viewpoints_around(ELEVATIONS_DEG, AZIMUTHS, DISTANCE_MM).cameras(capture_mm)
-    return Truth(scene, cameras, ground_truths(scene, cameras, lambda _: None))
+    return pinhole_targets(prepared_scene(built_in_object(capture_mm)), cameras)
 
 
 @dataclass(frozen=True)

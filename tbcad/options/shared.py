@@ -68,19 +68,18 @@ UnitOption = Annotated[Literal["mm", "cm", "m", "in"] | None, typer.Option("--un
 PlotFormatOption = Annotated[Literal["png", "svg", "pdf"], typer.Option("--format")]
 """Of plots: png, or svg and pdf for papers."""
 METHODS = (
-    "nearest: the colour of the nearest captured ray, as in the paper; blend: the mean of several "
-    "virtual cameras that see the same point"
+    "nearest: the colour of the nearest captured ray, as in the paper; depth: the mean of several "
+    "virtual cameras at the depth that the light field itself shows"
 )
 MethodOfStudy = Annotated[
-    Literal["nearest", "blend", "field"],
+    Literal["nearest", "depth", "field"],
     typer.Option(help=f"{METHODS}; field: a coarse field that is fitted to all rays in seconds."),
 ]
 MethodOfView = Annotated[
-    Literal["nearest", "blend", "depth", "field"] | None,
+    Literal["nearest", "depth", "field"] | None,
     typer.Option(
-        help=f"{METHODS}; depth: a blend at the depth that the light field itself shows; field: "
-        "the field of tbcad reconstruct. By default field where field.npz is in the capture's "
-        "folder, else depth."
+        help=f"{METHODS}; field: the field of tbcad reconstruct. By default field where field.npz "
+        "is in the capture's folder, else depth."
     ),
 ]
 Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS")]

@@ -12,22 +12,19 @@ from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import Spec
-from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import traced_light_field
 from tbcad.light.simulate.capture.photograph import Sensor, count_pixels, virtual_cameras
 from tbcad.light.simulate.scene.object import patterned_ball
-from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
+from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.views.viewpoints import (
-    StudyMethod,
-    ground_truths,
+    ViewMethod,
+    ViewTargets,
     image_quality_map,
-    object_masks,
+    pinhole_targets,
     viewpoints_over_hemisphere,
-    views_by,
 )
-from tbcad.studies.paper import MAX_N, notes, try_design, with_lens_of_table_i
-from tbcad.types import Bools, Bytes, Progress
+from tbcad.studies.paper import notes, try_design, with_lens_of_table_i
+from tbcad.types import Progress
 
 SUBDIVISIONS = (6, 9, 12, 15, 18, 22, 27, 33)
 NEAR, FAR = 0.3, 0.98  # radius of the ball, in that of the capture sphere
@@ -45,9 +42,7 @@ class Subject:
 
     surface: str  # "matt" or "glossy"
     radius_mm: float  # of the ball
-    scene: Scene  # the ball
-    truths: list[Bytes]  # from each viewpoint, (h, w, 3)
-    masks: list[Bools]  # where they show it, (h, w)
+    seen: ViewTargets  # from each viewpoint
 
     @property
     def name(self) -> str:
@@ -55,24 +50,12 @@ class Subject:
         return f"{self.surface}, {self.radius_mm:g} mm from the reference plane"
 
 
-def parse_subdivisions(given: list[int] | None) -> tuple[int, ...]:
-    """Subdivisions n in ascending order, each once; by default SUBDIVISIONS.
-
-    InputError: no design has one of them.
-    """
-    ns = tuple(sorted(set(given or SUBDIVISIONS)))
-    if ns[0] < 2 or ns[-1] > MAX_N:
-        wrong = ns[0] if ns[0] < 2 else ns[-1]
-        raise InputError(f"--n is {wrong}, allowed is 2 to {MAX_N}: change it")
-    return ns
-
-
 def balance(
     spec: Spec,
     ns: tuple[int, ...],
     views: int,
     distance_mm: float,
-    method: StudyMethod,
+    method: ViewMethod,
     progress: Progress = lambda _: None,
 ) -> Study:
     """The study: SSIM of views over n at the design's sensor, for four objects."""
@@ -80,7 +63,7 @@ def balance(
     viewpoints = viewpoints_over_hemisphere(views, distance_mm)
     cameras = viewpoints.cameras(spec.optics.capture_diameter_mm)
     seen = subjects(spec.optics.capture_diameter_mm, cameras, progress)
-    records = [one for n in ns for one in _of_n(spec, n, seen, cameras, method, progress)]
+    records = [one for n in ns for one in _of_n(spec, n, seen, method, progress)]
     table = Table.of_records("balance", records, (f"Method: {method}.", *notes("balance")), COLUMNS)
     best = [one for subject in seen for one in _best(table, subject)]
     panels = (_panel(table, seen, method),)
@@ -95,20 +78,13 @@ def subjects(capture_mm: float, cameras: list[Camera], progress: Progress) -> li
     for share in (NEAR, FAR):
         radius = round(share * capture_mm / 2, 2)
         matt = prepared_scene(patterned_ball(radius))
-        masks = object_masks(matt, cameras)
         for surface, scene in (("matt", matt), ("glossy", replace(matt, gloss=GLOSS))):
-            truths = ground_truths(scene, cameras, progress)
-            result.append(Subject(surface, radius, scene, truths, masks))
+            result.append(Subject(surface, radius, pinhole_targets(scene, cameras, progress)))
     return result
 
 
 def _of_n(
-    spec: Spec,
-    n: int,
-    seen: list[Subject],
-    cameras: list[Camera],
-    method: StudyMethod,
-    progress: Progress,
+    spec: Spec, n: int, seen: list[Subject], method: ViewMethod, progress: Progress
 ) -> list[Record]:
     """A row for each object, or for what a refusal of the design says."""
     attempt = try_design(spec, optics={"n": n})
@@ -119,7 +95,7 @@ def _of_n(
     rows: list[Record] = []
     for one in seen:
         progress(f"n = {n}: {one.name}")
-        value = ssim_on_object(attempt.design, one, cameras, method)
+        value = ssim_on_object(attempt.design, one.seen, method)
         own: Record = {"surface": one.surface, "radius_mm": one.radius_mm, "ssim_on_object": value}
         rows.append({**head, **own})
     return rows
@@ -133,15 +109,12 @@ def _counts(design: MirrorDesign) -> Record:
     return {"virtual_cameras": number, "pixels": float(2 * counts.seen.sum() / number)}
 
 
-def ssim_on_object(
-    design: MirrorDesign, subject: Subject, cameras: list[Camera], method: StudyMethod
-) -> float:
+def ssim_on_object(design: MirrorDesign, seen: ViewTargets, method: ViewMethod) -> float:
     """Mean local SSIM where the object is, over all views."""
-    tiles = MirrorTiles(traced_light_field(design, subject.scene))
-    view = views_by(method, tiles, subject.scene)
+    view = method.views(traced_light_field(design, seen.scene))
     values = [
         image_quality_map(truth, view(at))[1][mask].mean()
-        for at, truth, mask in zip(cameras, subject.truths, subject.masks, strict=True)
+        for at, truth, mask in zip(seen.cameras, seen.truths, seen.masks, strict=True)
     ]
     return float(np.mean(values))
 
@@ -160,7 +133,7 @@ def _best(table: Table, subject: Subject) -> list[Record]:
     return [{**best, "cameras_per_pixel": ratio, "object": subject.name}]
 
 
-def _panel(table: Table, seen: list[Subject], method: StudyMethod) -> PlotPanel:
+def _panel(table: Table, seen: list[Subject], method: ViewMethod) -> PlotPanel:
     styles = ("C0o-", "C0s--", "C1o-", "C1s--")
     series = []
     for subject, style in zip(seen, styles, strict=True):

@@ -18,7 +18,6 @@ from tbcad.core.camera.requirements import (
     virtual_images,
 )
 from tbcad.core.spec.design import Spec
-from tbcad.errors import InputError
 from tbcad.studies.paper import claimed, claims, notes, try_design, with_lens_of_table_i
 from tbcad.types import Floats, Progress
 
@@ -49,7 +48,6 @@ IMAGES = (
     ("flat", 1, 0, "flat mirrors: centre", "k."),
 )
 SMALLEST_STOP = 8  # of the plot, in F-numbers of the lens wide open
-MAX_OPTION = 1000
 
 
 @dataclass(frozen=True)
@@ -60,19 +58,11 @@ class LensOptions:
     pixel_um: float = 3.45  # width of a pixel, micrometres
     wide_open: float = 2.8  # F-number of the lens fully open
 
-    def checked(self) -> "LensOptions":
-        """These, when all are above 0 to 1000; InputError: one is not."""
-        for option, value in vars(self).items():
-            if not 0 < value <= MAX_OPTION:
-                name = "--" + option.replace("_", "-")
-                raise InputError(f"{name} {value:g}: allowed is above 0 to {MAX_OPTION}: change it")
-        return self
-
 
 def depth_of_field(spec: Spec, options: LensOptions, progress: Progress = lambda _: None) -> Study:
     """The study: where the images are by all radius rules, and the stops for them."""
     spec = with_lens_of_table_i(spec)
-    camera, wide_open = spec.camera, options.checked().wide_open
+    camera, wide_open = spec.camera, options.wide_open
     lens = lens_for(
         np.radians(camera.hfov_deg), camera.width_px, options.pixel_um / 1000, wide_open
     )

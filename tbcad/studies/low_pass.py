@@ -1,5 +1,6 @@
 """Views with the prototype, blurred by an optical low-pass filter (section 5.3, Fig. 11)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -7,7 +8,6 @@ import numpy as np
 
 from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.optics.camera import Camera
-from tbcad.errors import InputError
 from tbcad.light.simulate.camera_photographs import photographed
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import Samples, subpixel_shifts, to_bytes
@@ -24,15 +24,14 @@ from tbcad.light.simulate.views.refocus import (
     refocus,
 )
 from tbcad.light.simulate.views.viewpoints import (
+    BY_NEAREST,
     Viewpoints,
-    ground_truths,
-    object_masks,
-    picture_quality,
-    view_quality,
+    ViewTargets,
+    pinhole_targets,
 )
 from tbcad.options.captures import Geometry
 from tbcad.studies.paper import claimed, notes
-from tbcad.types import Bytes, Floats, Progress
+from tbcad.types import Bytes, Progress
 
 WHERE = "section 5.3, Fig. 11"
 NO_FILTER = "none"
@@ -41,7 +40,6 @@ ELEVATIONS_DEG = (15.0, 45.0)
 LENS_SIZE = (320, 240)  # pixels of the pictures with the large aperture
 TRUTH_RAYS = 64  # a pixel of their ground truth
 LENS_RAYS = 9  # over the blur circle, times samples x samples
-MAX_SPREAD_PX = 16.0
 
 
 @dataclass(frozen=True)
@@ -63,16 +61,6 @@ class BlurOptions:
     # a pixel, in each of the filter's images, is the mean of samples x samples rays
     samples: int = 2
 
-    def checked(self) -> "BlurOptions":
-        """These, when all are above 0 to 16; InputError: one is not."""
-        for option, values in (("--filter-px", self.separations_px), ("--lens-px", self.lens_px)):
-            for value in values:
-                if not 0 < value <= MAX_SPREAD_PX:
-                    raise InputError(
-                        f"{option} {value:g}: allowed is above 0 to {MAX_SPREAD_PX:g}: change it"
-                    )
-        return self
-
     def cases(self) -> list[Blur]:
         """Shell and prototype without blur, and the prototype with each."""
         n, rays = self.samples, LENS_RAYS * self.samples**2
@@ -82,18 +70,6 @@ class BlurOptions:
             *(Blur(PROTOTYPE, "filter", px, low_pass_shifts(px, n)) for px in self.separations_px),
             *(Blur(PROTOTYPE, "lens", px, defocus_shifts(px, rays)) for px in self.lens_px),
         ]
-
-
-@dataclass(frozen=True)
-class _Targets:
-    """The viewpoints, and the truth at each."""
-
-    scene: Scene
-    pinholes: list[Camera]
-    truths: list[Bytes]
-    lenses: list[Camera]
-    lens_truths: list[Bytes]
-    focus: ThinLens
 
 
 def low_pass(
@@ -107,16 +83,23 @@ def low_pass(
 
     The distance of the viewpoints is that of the pinholes. InputError: the export has no prototype.
     """
-    targets = _targets(export, subject, viewpoints, progress)
+    scene, focus = prepared_scene(subject), ThinLens(claimed("prototype_aperture"), 0.0)
+    near = replace(viewpoints, distance_mm=claimed("prototype_distance"))
+    lenses = _lens_targets(scene, near.cameras(export.capture_mm, LENS_SIZE), focus, progress)
+    pinholes = pinhole_targets(scene, viewpoints.cameras(export.capture_mm), progress)
     records: list[Record] = []
     sharpest: dict[str, float] = {}
-    for case in options.checked().cases():
+    for case in options.cases():
         geometry: Geometry = "prototype" if case.geometry == PROTOTYPE else "spheres"
-        light_field = photographed(export, targets.scene, geometry, case.samples, progress)
+        light_field = photographed(export, scene, geometry, case.samples, progress)
         contrast = _contrast(light_field)
         relative = contrast / sharpest.setdefault(case.geometry, contrast)
         head: Record = {"geometry": case.geometry, "blur": case.name, "px": case.px}
-        for kind, quality in _views(MirrorTiles(light_field), targets, progress).items():
+        views = {
+            "pinhole": pinholes.quality(BY_NEAREST.views(light_field), progress),
+            "aperture": lenses.quality(_refocused(light_field, focus), progress),
+        }
+        for kind, quality in views.items():
             for row in Table.of_columns("", {**viewpoints.angles(), **quality}).records():
                 records.append({**head, "view": kind, **row, "photograph_contrast": relative})
     table = Table.of_records("low-pass", records, (f"Object: {subject.name}.", *notes("low-pass")))
@@ -124,20 +107,19 @@ def low_pass(
     return Study("low-pass", _figures(means), (table, means), _panels(means))
 
 
-def _targets(
-    export: ExportedDesign, subject: SceneObject, viewpoints: Viewpoints, progress: Progress
-) -> _Targets:
-    scene = prepared_scene(subject)
-    pinholes = viewpoints.cameras(export.capture_mm)
-    near = replace(viewpoints, distance_mm=claimed("prototype_distance"))
-    lenses = near.cameras(export.capture_mm, LENS_SIZE)
-    focus = ThinLens(claimed("prototype_aperture"), 0.0)
-    lens_truths = []
-    for k, view in enumerate(lenses):
-        progress(f"truth of the aperture {k + 1} of {len(lenses)}")
-        lens_truths.append(to_bytes(lens_picture(scene, view, focus, TRUTH_RAYS)))
-    truths = ground_truths(scene, pinholes, progress)
-    return _Targets(scene, pinholes, truths, lenses, lens_truths, focus)
+def _lens_targets(
+    scene: Scene, cameras: list[Camera], focus: ThinLens, progress: Progress
+) -> ViewTargets:
+    truths = []
+    for k, view in enumerate(cameras):
+        progress(f"truth of the aperture {k + 1} of {len(cameras)}")
+        truths.append(to_bytes(lens_picture(scene, view, focus, TRUTH_RAYS)))
+    return ViewTargets(scene, cameras, truths)
+
+
+def _refocused(light_field: LightField, focus: ThinLens) -> Callable[[Camera], Bytes]:
+    tiles = MirrorTiles(light_field)
+    return lambda view: refocus(tiles, view, focus).image
 
 
 def _contrast(light_field: LightField) -> float:
@@ -148,21 +130,6 @@ def _contrast(light_field: LightField) -> float:
         same = (mirror[:, 1:] == mirror[:, :-1]) & (mirror[:, 1:] > 0)
         squares.append(np.mean((colour[:, 1:] - colour[:, :-1])[same] ** 2))
     return float(np.sqrt(np.mean(squares)))
-
-
-def _views(
-    tiles: MirrorTiles, targets: _Targets, progress: Progress
-) -> dict[str, dict[str, Floats]]:
-    """Quality of the pinholes' views and of those with the aperture, each (v,) by its name."""
-    scene = targets.scene
-    pinhole = view_quality(tiles, scene, targets.pinholes, targets.truths, "nearest", progress)
-    rows: list[dict[str, float]] = []
-    masks = object_masks(scene, targets.lenses)
-    for view, truth, mask in zip(targets.lenses, targets.lens_truths, masks, strict=True):
-        progress(f"aperture {len(rows) + 1} of {len(masks)}")
-        rows.append(picture_quality(view, truth, refocus(tiles, view, targets.focus).image, mask))
-    aperture = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    return {"pinhole": pinhole, "aperture": aperture}
 
 
 def _means(table: Table) -> list[Record]:

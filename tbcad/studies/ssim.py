@@ -4,7 +4,6 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +20,12 @@ from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import ExportedDesign, reflectors
-from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.viewpoints import (
     QUALITY,
-    StudyMethod,
+    ViewMethod,
     Viewpoints,
-    ground_truths,
-    view_quality,
+    ViewTargets,
+    pinhole_targets,
 )
 from tbcad.options.captures import Geometry
 from tbcad.studies.paper import (
@@ -38,7 +36,7 @@ from tbcad.studies.paper import (
     try_design,
     with_lens_of_table_i,
 )
-from tbcad.types import Bytes, Floats, Progress
+from tbcad.types import Floats, Progress
 
 MEANS = ("width_px", "height_px", "n", "elevation_deg", "views", *QUALITY, "ssim_sd")
 FITS = ("elevation_deg", "sensors", "slope", "intercept", "r2")
@@ -66,14 +64,18 @@ def ssim(
     subject: SceneObject,
     sensors: tuple[Sensor, ...],
     viewpoints: Viewpoints,
-    method: StudyMethod,
+    method: ViewMethod,
     progress: Progress = lambda _: None,
 ) -> Study:
     """The study: captures with every sensor and its n, and views of each against the truth."""
     spec, scene = with_lens_of_table_i(spec), prepared_scene(subject)
-    truths = ground_truths(scene, viewpoints.cameras(spec.optics.capture_diameter_mm), progress)
-    compared = partial(_compared, spec, scene, viewpoints, truths, method, progress)
-    records = [record for sensor in sensors for record in compared(sensor)]
+    cameras = viewpoints.cameras(spec.optics.capture_diameter_mm)
+    targets = pinhole_targets(scene, cameras, progress)
+    records: list[Record] = []
+    for sensor in sensors:
+        head, quality, reason = _compared(spec, targets, method, progress, sensor)
+        views = Table.of_columns("", {**viewpoints.angles(), **quality})
+        records += [{**head, **view, "reason": reason} for view in views.records()]
     table = Table.of_records(
         "ssim", records, (f"Object: {subject.name}; {method}.", *notes("ssim"))
     )
@@ -86,25 +88,15 @@ def ssim(
 
 
 def _compared(
-    spec: Spec,
-    scene: Scene,
-    viewpoints: Viewpoints,
-    truths: list[Bytes],
-    method: StudyMethod,
-    progress: Progress,
-    sensor: Sensor,
-) -> list[Record]:
-    """PSNR and SSIM of the views with one sensor, or what a refusal of its design says."""
-    n, cameras = sensor_n(spec, sensor), viewpoints.cameras(spec.optics.capture_diameter_mm)
-    attempt = try_design(spec, optics={"n": n}, camera=asdict(sensor))
-    quality = {name: np.full(len(cameras), np.nan) for name in QUALITY}
-    if attempt.design is not None:
-        with _light_field(attempt.design, scene, progress) as light_field:
-            tiles = MirrorTiles(light_field)
-            quality = view_quality(tiles, scene, cameras, truths, method, progress)
-    head: Record = {**asdict(sensor), "n": n}
-    views = Table.of_columns("", {**viewpoints.angles(), **quality}).records()
-    return [{**head, **view, "reason": attempt.reason} for view in views]
+    spec: Spec, targets: ViewTargets, method: ViewMethod, progress: Progress, sensor: Sensor
+) -> tuple[Record, dict[str, Floats], str]:
+    """One sensor with its n, QUALITY of its views, and what a refusal of its design says."""
+    head: Record = {**asdict(sensor), "n": sensor_n(spec, sensor)}
+    attempt = try_design(spec, optics={"n": head["n"]}, camera=asdict(sensor))
+    if attempt.design is None:
+        return head, dict.fromkeys(QUALITY, np.full(len(targets.cameras), np.nan)), attempt.reason
+    with _light_field(attempt.design, targets.scene, progress) as light_field:
+        return head, targets.quality(method.views(light_field), progress), attempt.reason
 
 
 @contextmanager
@@ -237,7 +229,7 @@ def prototype_vs_shell(
     export: ExportedDesign,
     subject: SceneObject,
     viewpoints: Viewpoints,
-    method: StudyMethod,
+    method: ViewMethod,
     samples: int = 3,
     progress: Progress = lambda _: None,
 ) -> Study:
@@ -246,14 +238,11 @@ def prototype_vs_shell(
     A pixel of a photograph is the mean of samples x samples rays. InputError: there is no prototype
     in the export.
     """
-    scene, views = prepared_scene(subject), viewpoints.cameras(export.capture_mm)
-    truths = ground_truths(scene, views, progress)
+    scene = prepared_scene(subject)
+    targets = pinhole_targets(scene, viewpoints.cameras(export.capture_mm), progress)
     kinds: tuple[Geometry, ...] = ("spheres", "prototype")
     light_fields = (photographed(export, scene, kind, samples, progress) for kind in kinds)
-    shell, prototype = (
-        view_quality(MirrorTiles(one), scene, views, truths, method, progress)
-        for one in light_fields
-    )
+    shell, prototype = (targets.quality(method.views(one), progress) for one in light_fields)
     facts = f"Object: {subject.name}; {method}; {samples} x {samples} rays a pixel."
     columns = {
         **viewpoints.angles(),

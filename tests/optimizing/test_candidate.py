@@ -14,7 +14,7 @@ from tbcad.light.reconstruction.picture import BY_FIELD
 from tbcad.light.reconstruction.start import Level, Settings
 from tbcad.light.simulate.capture.photograph import Sensor, virtual_camera_pixels
 from tbcad.light.simulate.scene.object import built_in_object
-from tbcad.light.simulate.views.viewpoints import viewpoints_around
+from tbcad.light.simulate.views.viewpoints import BY_NEAREST, ViewMethod, viewpoints_around
 from tbcad.optimizing import candidate
 from tbcad.optimizing.candidate import (
     MachineLimits,
@@ -85,10 +85,10 @@ def few_views(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(
     ("method", "of_study"),
-    [("nearest", "nearest"), pytest.param("field", BY_FIELD, marks=pytest.mark.slow)],
+    [("nearest", BY_NEAREST), pytest.param("field", BY_FIELD, marks=pytest.mark.slow)],
 )
 def test_it_is_the_figure_of_the_study(
-    method: str, of_study: str, monkeypatch: pytest.MonkeyPatch
+    method: str, of_study: ViewMethod, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(picture, "QUICK", Settings(levels=(Level(24, 1),), batch=3000))
     viewpoints = viewpoints_around((15.0,), 1, 640.0)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.light.simulate.views.refocus import ThinLens
-    from tbcad.light.simulate.views.synthesis import Method, SynthesisedView
+    from tbcad.light.simulate.views.synthesis import SynthesisedView
     from tbcad.types import Progress
 
 
@@ -92,7 +92,7 @@ class Views:
         *,
         distance_mm: float = 640.0,
         size: tuple[int, int] = (640, 480),
-        method: Method | Literal["depth"] | None = None,
+        method: Literal["nearest", "depth"] | None = None,
     ) -> SynthesisedView:
         """One of them, as `tbcad.view`.
 
@@ -110,17 +110,14 @@ class Views:
         capture_mm = self.light_field.capture_mm if made is None else made.grid.width_mm
         camera = camera_around_object(*angles, distance_mm, capture_mm, size)
         if made is None:
-            return self._of_light_field(camera, method or "depth")
+            from tbcad.light.simulate.views.synthesis import synthesise
+
+            if method == "nearest":
+                return synthesise(self.tiles, camera)
+            return self._depths.of(camera)[0]
         if method is not None:
             raise InputError(f"method {method!r} is for a light field: leave it out for a field")
         return _of_field(made, camera)
-
-    def _of_light_field(self, camera: Camera, method: Method | Literal["depth"]) -> SynthesisedView:
-        from tbcad.light.simulate.views.synthesis import synthesise
-
-        if method == "depth":
-            return self._depths.of(camera)[0]
-        return synthesise(self.tiles, camera, method)
 
 
 def _of_field(made: Field, camera: Camera) -> SynthesisedView:
@@ -140,7 +137,7 @@ def view(
     *,
     distance_mm: float = 640.0,
     size: tuple[int, int] = (640, 480),
-    method: Method | Literal["depth"] | None = None,
+    method: Literal["nearest", "depth"] | None = None,
 ) -> SynthesisedView:
     """Synthesise the picture of a pinhole camera anywhere around the object, as `tbcad view` does.
 
@@ -151,8 +148,8 @@ def view(
         elevation_deg: of the camera above the plane z = 0, 0 to 90.
         distance_mm: of the camera from the centre of the object.
         size: columns and rows of the picture.
-        method: of a light field: "nearest" rays, the quickest; "blend" on a plane; or a blend at
-            the "depth" that the light field itself shows, the best and the default, for which the
+        method: of a light field: "nearest" rays, the quickest; or a blend at the "depth" that
+            the light field itself shows, the best and the default, for which the
             pictures of all virtual cameras are made first. `Views` keeps them for further views.
 
     Raises:

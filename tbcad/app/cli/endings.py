@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import typer
 
@@ -133,7 +133,8 @@ def usage_error_text(error: typer.TyperException) -> str:
 def _wrong_value(parameter: Any, error: "ValidationError") -> str:
     kind, given = parameter.type_descriptor, error.errors(include_url=False)[0]["input"]
     limits = kind.parameter_info.min, kind.parameter_info.max
-    choices = kind.choices if kind.is_choice else [allowed_between(kind.annotation, *limits)]
+    one = next(iter(get_args(kind.annotation)), kind.annotation)  # of what is repeatable
+    choices = kind.choices if kind.is_choice else [allowed_between(one, *limits)]
     return refusal(_name(parameter), given, " or ".join(choices))
 
 

@@ -1,14 +1,12 @@
 """A capture as a folder for another program, with the figures of how well it fits."""
 
 import json
-import zipfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from tbcad.cad.formats.checked_files import Row, write_table
@@ -45,8 +43,6 @@ MODEL = Path("sparse", "0")
 MASK_SUFFIX = ".png.png"
 RAYS, RAYS_H5 = "rays.npz", "rays.h5"
 RAYS_PER_CHUNK = 1 << 16
-# Zip files have times; a fixed one gives the same bytes each time.
-NO_TIME = (1980, 1, 1, 0, 0, 0)
 RAY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
     "origin": ("<f4", (3,)),
     "direction": ("<f4", (3,)),
@@ -215,53 +211,33 @@ def write_colmap(
 def write_ray_table(
     folder: Path, source: LightField, virtual: FittedCameras, progress: Progress
 ) -> int:
-    """Write origin, direction, colour and virtual camera of the n rays that meet the sphere; n."""
-    total = int(virtual.rays.sum())
-    with zipfile.ZipFile(folder / RAYS, "w") as packed:
-        for name, (kind, last) in RAY_COLUMNS.items():
-            progress(name)
-            header = {"descr": kind, "fortran_order": False, "shape": (total, *last)}
-            with packed.open(_entry(name), "w", force_zip64=True) as file:
-                npy.write_array_header_1_0(file, header)
-                for values in _values(source, virtual, name):
-                    file.write(values.astype(kind).tobytes())
-        for name, table in _tables(virtual).items():
-            with packed.open(_entry(name), "w") as file:
-                npy.write_array(file, table, allow_pickle=False)
-    progress(RAYS_H5)
-    _write_h5(folder / RAYS_H5, source, virtual, total)
-    return total
+    """Write origin, direction, colour and virtual camera of the n rays that meet the sphere; n.
 
-
-def _write_h5(path: Path, source: LightField, virtual: FittedCameras, total: int) -> None:
-    """The same arrays, of which programs read parts."""
-    with h5py.File(path, "w", libver=("v110", "v110")) as store:
-        stored = {
-            name: chunked(store, name, kind, (total, *last), (min(RAYS_PER_CHUNK, total), *last))
-            for name, (kind, last) in RAY_COLUMNS.items()
-        }
-        for name in RAY_COLUMNS:
-            first = 0
-            for values in _values(source, virtual, name):
-                stored[name][first : first + len(values)] = values
-                first += len(values)
-        tables = _tables(virtual)
-        store.create_dataset("name", data=tables["name"].astype("S"))
-        store.create_dataset("centre", data=tables["centre"])
-
-
-def _entry(name: str) -> zipfile.ZipInfo:
-    entry = zipfile.ZipInfo(f"{name}.npy", NO_TIME)
-    entry.compress_type = zipfile.ZIP_DEFLATED
-    return entry
-
-
-def _values(source: LightField, virtual: FittedCameras, name: str) -> Iterator[NDArray[np.generic]]:
+    As a NumPy archive, and the same arrays as HDF5, of which programs read parts.
+    """
+    total, first = int(virtual.rays.sum()), 0
+    arrays: dict[str, NDArray[Any]] = {
+        name: np.empty((total, *last), kind) for name, (kind, last) in RAY_COLUMNS.items()
+    }
     for k in reading_order(source, virtual.mirrors).tolist():
+        progress(virtual.mirrors[k].name)
         crop = crop_of(source, virtual.mirrors[k])
-        yield np.full(crop.meets.sum(), k) if name == "camera" else getattr(crop, name)[crop.meets]
-
-
-def _tables(virtual: FittedCameras) -> dict[str, NDArray[np.generic]]:
+        part = slice(first, first := first + int(crop.meets.sum()))
+        for name in ("origin", "direction", "colour"):
+            arrays[name][part] = getattr(crop, name)[crop.meets]
+        arrays["camera"][part] = k
     names = np.array([one.name for one in virtual.mirrors], dtype="<U8")
-    return {"name": names, "centre": virtual.centre}
+    progress(RAYS)
+    np.savez_compressed(
+        folder / RAYS, allow_pickle=False, **arrays, name=names, centre=virtual.centre
+    )
+    progress(RAYS_H5)
+    with h5py.File(folder / RAYS_H5, "w", libver=("v110", "v110")) as store:
+        rows = min(RAYS_PER_CHUNK, total)
+        for name, (kind, last) in RAY_COLUMNS.items():
+            chunked(store, name, kind, (total, *last), (rows, *last))
+        for name, values in arrays.items():
+            store[name][:] = values
+        store.create_dataset("name", data=names.astype("S"))
+        store.create_dataset("centre", data=virtual.centre)
+    return total

@@ -11,7 +11,6 @@ from collections.abc import Iterable
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
-from xml.etree import ElementTree as Xml
 
 import numpy as np
 
@@ -57,59 +56,37 @@ def write_machine_scene(
     (folder / MESHES / "object.ply").write_bytes(mesh.ply())
     facets["object"] = len(mesh.faces)
     for name, camera in cameras.items():
-        (folder / f"camera_{name}.xml").write_bytes(mitsuba_scene(camera, list(facets)))
+        text = mitsuba_scene(camera, cameras)
+        (folder / f"camera_{name}.xml").write_text(text, encoding="utf-8")
     (folder / BLENDER).write_text(blender_script(cameras, list(facets)), encoding="utf-8")
     return {"facets": facets}
 
 
-def mitsuba_scene(camera: Camera, parts: list[str]) -> bytes:
-    """The scene file of a camera (XML)."""
-    # What a capture sees: from the camera, by one mirror at most. The object is no lamp: Mitsuba
-    # 3.9 crashes when it chooses points on one whose colours are those of its corners.
-    samples = [("integer", "emitter_samples", "0"), ("integer", "bsdf_samples", "1")]
-    scene = Xml.Element("scene", version="3.0.0")
-    _add(scene, "integrator", samples, type="direct")
-    lens = [("string", "fov_axis", "x"), ("float", "fov", repr(float(np.degrees(camera.hfov)))),
-            ("float", "near_clip", "1"), ("float", "far_clip", "10000")]  # fmt: skip
-    sensor = _add(scene, "sensor", lens, type="perspective")
+def mitsuba_scene(camera: Camera, cameras: Iterable[str]) -> str:
+    """The scene file (XML) of a camera, with the shells of all.
+
+    What a capture sees: from the camera, by one mirror at most. The object is no lamp: Mitsuba 3.9
+    crashes when it chooses points on one whose colours are those of its corners.
+    """
     target, up = camera.pinhole + 100 * camera.forward, -camera.axes[1]
-    places = {"origin": camera.pinhole, "target": target, "up": up}
-    place = {name: ", ".join(repr(float(x)) for x in at) for name, at in places.items()}
-    _add(_add(sensor, "transform", name="to_world"), "lookat", (), **place)
-    size = [
-        ("integer", "width", str(camera.width_px)),
-        ("integer", "height", str(camera.height_px)),
-    ]
-    _add(_add(sensor, "film", size, type="hdrfilm"), "rfilter", type="box")
-    _add(sensor, "sampler", [("integer", "sample_count", str(SAMPLES))], type="stratified")
-    for part in parts:
-        file = [("string", "filename", f"{MESHES}/{part}.ply")]
-        _add_material(_add(scene, "shape", file, type="ply", id=part), part)
-    Xml.indent(scene)
-    return bytes(Xml.tostring(scene, encoding="utf-8", xml_declaration=True)) + b"\n"
+    places = {"ORIGIN": camera.pinhole, "TARGET": target, "UP": up}
+    return _filled(
+        "mitsuba_scene.xml.txt",
+        FOV=repr(float(np.degrees(camera.hfov))),
+        **{name: ", ".join(repr(float(x)) for x in at) for name, at in places.items()},
+        WIDTH=str(camera.width_px),
+        HEIGHT=str(camera.height_px),
+        SAMPLES=str(SAMPLES),
+        SHELLS="".join(_filled("mitsuba_shell.xml.txt", CAMERA=name) for name in cameras),
+    )
 
 
-def _add_material(shape: Xml.Element, part: str) -> None:
-    """Mirrors reflect all light, walls none; the object sends out its colours."""
-    if part.startswith("mirrors"):
-        sides = _add(shape, "bsdf", type="twosided")
-        _add(sides, "bsdf", [("string", "material", "none")], type="conductor")
-        return
-    _add(shape, "bsdf", [("rgb", "reflectance", "0")], type="diffuse")
-    if part == "object":
-        colours = [("string", "name", "vertex_color")]
-        light = _add(shape, "emitter", type="area")
-        _add(light, "texture", colours, type="mesh_attribute", name="radiance")
-
-
-def _add(
-    parent: Xml.Element, tag: str, values: Iterable[tuple[str, str, str]] = (), **attributes: str
-) -> Xml.Element:
-    """An element with values in it, each by its type, name and text."""
-    added = Xml.SubElement(parent, tag, attributes)
-    for kind, name, value in values:
-        Xml.SubElement(added, kind, name=name, value=value)
-    return added
+def _filled(template: str, **fields: str) -> str:
+    """A file of this package with text in its places."""
+    text = (files("tbcad.light.datasets") / template).read_text(encoding="utf-8")
+    for name, value in fields.items():
+        text = text.replace(f"{{{{{name}}}}}", value)
+    return text
 
 
 def blender_script(cameras: dict[str, Camera], parts: list[str]) -> str:
@@ -119,8 +96,7 @@ def blender_script(cameras: dict[str, Camera], parts: list[str]) -> str:
         "samples": SAMPLES,
         "cameras": {name: _blender_camera(camera) for name, camera in cameras.items()},
     }
-    script = files("tbcad.light.datasets") / "blender_scene.py.txt"
-    return script.read_text(encoding="utf-8").replace("{{DATA}}", json.dumps(data))
+    return _filled("blender_scene.py.txt", DATA=json.dumps(data))
 
 
 def _blender_camera(camera: Camera) -> dict[str, Any]:

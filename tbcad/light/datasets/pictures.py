@@ -205,30 +205,3 @@ def _size(virtual: FittedCameras, capture_mm: float) -> int:
         return 1
     most = math.isqrt(MOST_VIEW_BYTES // (BYTES_PER_PIXEL * len(virtual)))
     return min(default_size(virtual, capture_mm), most)
-
-
-def facing(pictures: PinholePictures, view: Camera) -> tuple[Ints, Floats]:
-    """Virtual cameras on the side of a view (k,), and their places along its axes, (k, 3).
-
-    The places are weighted: a target ray to image point (x, y), at unit distance, is at least
-    |(px - pz x, py - pz y)| from all rays of a camera with place p, mm, as root mean square over
-    the depth of the capture sphere (`two_plane`).
-    """
-    scale, plane = pictures.capture_mm / 2 / np.sqrt(3), -float(view.pinhole @ view.forward)
-    place = (pictures.centre - view.pinhole) @ view.axes.T
-    depth = place[:, 2] - plane
-    near = np.flatnonzero(depth < 0)  # the others see the back of the object
-    return near, place[near] / np.sqrt(1 + (depth[near, None] / scale) ** 2)
-
-
-def projections(pictures: PinholePictures, view: Camera, some: Ints) -> Floats:
-    """Matrices (k, 3, 4) from points (right, down, forward, 1) of a view into some pictures.
-
-    The result is homogeneous: column and row, of which whole numbers are pixel centres.
-    """
-    lens = np.zeros((len(some), 3, 3))
-    lens[:, 0, 0] = lens[:, 1, 1] = pictures.focal_px[some]
-    lens[:, :2, 2], lens[:, 2, 2] = (pictures.mask.shape[1] - 1) / 2, 1.0
-    into = lens @ pictures.axes[some]
-    offset = into @ (view.pinhole - pictures.centre[some])[..., None]
-    return np.concatenate([into @ view.axes.T, offset], axis=2)

@@ -24,7 +24,7 @@ from scipy.stats import qmc
 
 from tbcad.cad.formats.mesh_files import points_ply
 from tbcad.core.geometry.vectors import dot, norm, unit
-from tbcad.core.optics.camera import Camera
+from tbcad.core.optics.camera import Camera, LensCamera
 from tbcad.light.datasets.pictures import PinholePictures, crop_of
 from tbcad.light.datasets.virtual_cameras import Crop, FittedCameras, at_middle
 from tbcad.light.simulate.capture.light_field import LightField
@@ -36,6 +36,7 @@ from tbcad.types import Bools, Bytes, Floats, Progress
 FITTED_RAYS = 150
 # Steps of the search that matter alike: radians and shares of the focal lengths, and pixels.
 SCALES = np.array([0.01] * 5 + [1.0] * 2)
+CORNER = 0.5  # of the first pixel from its centre, pixels: where files count from
 TRANSFORMS, POINTS = "transforms.json", "points.ply"
 IMAGES, MASKS = "images", "masks"
 NO_DISTORTION = {"k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0}
@@ -54,27 +55,6 @@ class SeedPoints:
     colours: Bytes  # median of what the virtual cameras see there, (n, 3)
 
 
-@dataclass(frozen=True)
-class Pinhole:
-    """A pinhole camera with its own focal length along rows and columns."""
-
-    centre: Floats  # mm, (3,)
-    axes: Floats  # rows: unit vectors along the rows, down the columns, and forward, (3, 3)
-    focal_px: Floats  # along the rows and down the columns, (2,)
-    principal_px: Floats  # column and row of the axis, (2,); the first pixel's centre is (0.5, 0.5)
-    size_px: tuple[int, int]  # columns and rows
-
-    @property
-    def camera_to_world(self) -> list[list[float]]:
-        """Matrix, 4 x 4."""
-        return camera_to_world(self.centre, self.axes)
-
-    def intrinsics(self) -> dict[str, Any]:
-        """Focal lengths, principal point and size by their names in transforms.json."""
-        numbers = *self.focal_px.tolist(), *self.principal_px.tolist(), *self.size_px
-        return dict(zip(("fl_x", "fl_y", "cx", "cy", "w", "h"), numbers, strict=True))
-
-
 def camera_to_world(centre: Floats, axes: Floats) -> list[list[float]]:
     """Matrix of a camera that looks along -z with +y up and +x to the right, 4 x 4.
 
@@ -87,7 +67,7 @@ def camera_to_world(centre: Floats, axes: Floats) -> list[list[float]]:
     return rows
 
 
-def fitted_pinhole(crop: Crop, centre: Floats) -> Pinhole:
+def fitted_pinhole(crop: Crop, centre: Floats) -> LensCamera:
     """The pinhole camera in whose picture the rays of a crop are nearest to their pixels.
 
     A crop is distorted, so some pixels remain: training follows the rays. Poses tell the loader
@@ -98,29 +78,29 @@ def fitted_pinhole(crop: Crop, centre: Floats) -> Pinhole:
     origin, direction = crop.rays
     some = slice(None, None, -(-len(rows) // FITTED_RAYS))
     points = at_middle(origin, direction, -unit(centre))[some] - centre
-    pixels = np.stack([columns + 0.5, rows + 0.5], axis=1)[some]
-    size = (crop.meets.shape[1], crop.meets.shape[0])
-    start = _linear_fit(points, pixels, centre, size)
+    pixels = np.stack([columns + CORNER, rows + CORNER], axis=1)[some]
+    first, start_focal, start_principal = _linear_fit(points, pixels)
 
-    def changed(change: Floats) -> Pinhole:
-        axes = Rotation.from_rotvec(change[:3]).as_matrix() @ start.axes
-        focal = start.focal_px * np.exp(change[3:5])
-        return Pinhole(centre, axes, focal, start.principal_px + change[5:], size)
+    def changed(change: Floats) -> tuple[Floats, Floats, Floats]:
+        axes = Rotation.from_rotvec(change[:3]).as_matrix() @ first
+        return axes, start_focal * np.exp(change[3:5]), start_principal + change[5:]
 
     def residuals(change: Floats) -> Floats:
-        camera = changed(change)
-        local = points @ camera.axes.T
-        slopes = local[:, :2] / local[:, 2:]
-        return (camera.focal_px * slopes + camera.principal_px - pixels).ravel()
+        axes, focal, principal = changed(change)
+        local = points @ axes.T
+        return (focal * (local[:, :2] / local[:, 2:]) + principal - pixels).ravel()
 
     fitted = least_squares(residuals, np.zeros(len(SCALES)), x_scale=SCALES, method="lm")
-    return changed(fitted.x)
+    axes, focal, principal = changed(fitted.x)
+    height, width = crop.meets.shape
+    return LensCamera(centre, axes, focal, principal - CORNER, np.zeros(5), width, height)
 
 
-def _linear_fit(points: Floats, pixels: Floats, centre: Floats, size: tuple[int, int]) -> Pinhole:
-    """A camera along the mean ray: slopes as a linear function of the pixels, without its shear.
+def _linear_fit(points: Floats, pixels: Floats) -> tuple[Floats, Floats, Floats]:
+    """Axes (3, 3), focal lengths (2,) and principal point (2,) of a camera along the mean ray.
 
-    The part of that function that is a rotation, its polar factor, turns the picture's axes.
+    Slopes as a linear function of the pixels, without its shear: the part of that function that is
+    a rotation, its polar factor, turns the picture's axes.
     """
     forward = unit(points.mean(axis=0))
     right = unit(np.cross(forward, np.eye(3)[np.abs(forward).argmin()]))
@@ -133,9 +113,7 @@ def _linear_fit(points: Floats, pixels: Floats, centre: Floats, size: tuple[int,
     rotation = u @ v
     focal = 1 / np.diag(rotation.T @ linear[:, :2])
     x, y = rotation.T @ np.stack([right, down])
-    return Pinhole(
-        centre, np.stack([x, y, forward]), focal, -focal * (rotation.T @ linear[:, 2]), size
-    )
+    return np.stack([x, y, forward]), focal, -focal * (rotation.T @ linear[:, 2])
 
 
 def write_nerfstudio(
@@ -209,10 +187,12 @@ def write_ngp_rays(
         )
         (images / f"dynamic_mask_{name}.png").write_bytes(mask_png(~crop.meets))
         (images / f"rays_{name}.dat").write_bytes(rays_file(crop, pinhole))
+        numbers = *pinhole.focal.tolist(), *(pinhole.principal + CORNER).tolist()
         return {
             "file_path": f"{IMAGES}/{name}.png",
-            **pinhole.intrinsics(),
-            "transform_matrix": pinhole.camera_to_world,
+            **dict(zip(("fl_x", "fl_y", "cx", "cy"), numbers, strict=True)),
+            **{"w": pinhole.width_px, "h": pinhole.height_px},
+            "transform_matrix": camera_to_world(pinhole.pinhole, pinhole.axes),
         }
 
     every = range(len(virtual))
@@ -223,20 +203,13 @@ def write_ngp_rays(
     (folder / TRANSFORMS).write_text(text, encoding="utf-8")
 
 
-def rays_file(crop: Crop, pinhole: Pinhole) -> bytes:
+def rays_file(crop: Crop, pinhole: LensCamera) -> bytes:
     """24 bytes a pixel; a pixel that is not used has the ray of the pinhole."""
-    known = crop.meets[..., None]
-    origin = np.where(known, crop.origin, pinhole.centre)
-    direction = np.where(known, crop.direction, _central_rays(pinhole))
+    known, (row, column) = crop.meets[..., None], np.indices(crop.meets.shape)
+    directions = pinhole.directions(np.stack([column, row], axis=-1).astype(np.float64))
+    origin = np.where(known, crop.origin, pinhole.pinhole)
+    direction = np.where(known, crop.direction, directions)
     return np.concatenate([origin, direction], axis=2).astype("<f4").tobytes()
-
-
-def _central_rays(pinhole: Pinhole) -> Floats:
-    width, height = pinhole.size_px
-    x = (np.arange(width) + 0.5 - pinhole.principal_px[0]) / pinhole.focal_px[0]
-    y = (np.arange(height) + 0.5 - pinhole.principal_px[1]) / pinhole.focal_px[1]
-    right, down, forward = pinhole.axes
-    return unit(forward + x[None, :, None] * right + y[:, None, None] * down)
 
 
 def seed_points(

@@ -3,6 +3,7 @@
 Depth is in mm behind the plane through the origin that faces the view, NaN where it is unknown.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,9 +16,11 @@ from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
 from tbcad.light.datasets.pictures import PinholePictures, pinhole_pictures
 from tbcad.light.depth.plane_sweep import FINE, Sweep, swept_depth
+from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.scene.rays import view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.synthesis import SynthesisedView, synthesise
+from tbcad.light.simulate.views.viewpoints import ViewMethod
 from tbcad.types import Bytes, Floats, Progress
 
 FRONT = 65535  # the number of the capture sphere's front; 0 is unknown
@@ -67,10 +70,6 @@ class DepthMap:
     def known(self) -> Floats:
         """Depth (h, w), NaN where no plane stands out as well."""
         return np.where(self.confidence > MIN_CONFIDENCE, self.depth, np.nan)
-
-    def points(self) -> Floats:
-        """Points (h, w, 3) of the surface, mm; NaN where it is not known."""
-        return depth_points(self.view, self.known())
 
     def png(self) -> bytes:
         """The depth as a PNG of 16 bits: 1 at the capture sphere's back, 65535 at its front."""
@@ -137,7 +136,7 @@ class DepthViews:
         where the camera looks elsewhere.
         """
         found = depth_map(self.pictures, view, self.sweep)
-        return synthesise(shown or self.tiles, view, "blend", found.along_rays), found
+        return synthesise(shown or self.tiles, view, found.along_rays), found
 
 
 def depth_views(
@@ -145,3 +144,11 @@ def depth_views(
 ) -> DepthViews:
     """Make the pictures of all virtual cameras, from which views are then made quickly."""
     return DepthViews(tiles, pinhole_pictures(tiles.source, progress), sweep)
+
+
+def _by_depth(source: LightField) -> Callable[[Camera], Bytes]:
+    views = depth_views(MirrorTiles(source))
+    return lambda view: views.of(view)[0].image
+
+
+BY_DEPTH = ViewMethod("depth", _by_depth)

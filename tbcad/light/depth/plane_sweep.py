@@ -13,7 +13,7 @@ from scipy.ndimage import median_filter, uniform_filter
 
 from tbcad.common.compiled import compiled_loop
 from tbcad.core.optics.camera import Camera
-from tbcad.light.datasets.pictures import PinholePictures, facing, projections
+from tbcad.light.datasets.pictures import PinholePictures
 from tbcad.light.simulate.parallel import chunks, first_then_threads
 from tbcad.light.simulate.scene.rays import view_directions
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
@@ -43,12 +43,32 @@ FINE = Sweep(4, 64, 5)
 QUICK = Sweep(8, 32, 3)
 
 
-class _Cameras(NamedTuple):
-    """Virtual cameras on the side of a view: numbers (k,), places (k, 3), matrices (k, 3, 4)."""
+class FacingCameras(NamedTuple):
+    """Virtual cameras on the side of a view."""
 
-    number: Ints
+    number: Ints  # (k,)
+    # along the view's axes and weighted: a target ray to image point (x, y), at unit distance, is
+    # at least |(px - pz x, py - pz y)| from all rays of a camera with place p, mm, as root mean
+    # square over the depth of the capture sphere (`two_plane`), (k, 3)
     place: Floats
+    # from points (right, down, forward, 1) of the view into their pictures, homogeneous: column and
+    # row, of which whole numbers are pixel centres, (k, 3, 4)
     matrix: Floats
+
+
+def facing_cameras(pictures: PinholePictures, view: Camera) -> FacingCameras:
+    """The virtual cameras on the side of a view; the others see the back of the object."""
+    scale, plane = pictures.capture_mm / 2 / np.sqrt(3), -float(view.pinhole @ view.forward)
+    place = (pictures.centre - view.pinhole) @ view.axes.T
+    depth = place[:, 2] - plane
+    some = np.flatnonzero(depth < 0)
+    place = place[some] / np.sqrt(1 + (depth[some, None] / scale) ** 2)
+    lens = np.zeros((len(some), 3, 3))
+    lens[:, 0, 0] = lens[:, 1, 1] = pictures.focal_px[some]
+    lens[:, :2, 2], lens[:, 2, 2] = (pictures.mask.shape[1] - 1) / 2, 1.0
+    into = lens @ pictures.axes[some]
+    offset = into @ (view.pinhole - pictures.centre[some])[..., None]
+    return FacingCameras(some, place, np.concatenate([into @ view.axes.T, offset], axis=2))
 
 
 def swept_depth(
@@ -64,8 +84,7 @@ def swept_depth(
     planes = np.linspace(-radius, radius, sweep.planes)
     inside = _inside(view, planes, radius)
     difference = np.full(inside.shape, np.float32(np.nan))
-    number, place = facing(pictures, view)
-    cameras = _Cameras(number, place, projections(pictures, view, number))
+    cameras = facing_cameras(pictures, view)
     known = pictures.picture, pictures.mask
     distance = planes - float(view.pinhole @ view.forward)
 
@@ -111,7 +130,7 @@ def _inside(view: Camera, planes: Floats, radius: float) -> Bools:
 
 @compiled_loop
 def _compare_rows(
-    cameras: _Cameras,
+    cameras: FacingCameras,
     pictures: tuple[Bytes, Bools],
     distance: Floats,
     pitch: float,
@@ -132,7 +151,7 @@ def _compare_rows(
             column, row = left - (width - 1) / 2, top - (height - 1) / 2
             half = (BLOCK_PX - 1) / 2
             x, y = (column + half) * pitch, (row + half) * pitch
-            near = _nearest_cameras(cameras.place, x, y, CAMERAS)
+            near = nearest_cameras(cameras.place, x, y, CAMERAS)
             _compare(
                 cameras.matrix[near],
                 cameras.number[near],
@@ -146,7 +165,7 @@ def _compare_rows(
 
 
 @compiled_loop
-def _nearest_cameras(place: Floats, x: float, y: float, most: int) -> Ints:
+def nearest_cameras(place: Floats, x: float, y: float, most: int) -> Ints:
     """So many of some cameras, at weighted places (k, 3), the nearest to a target ray first."""
     kept, squared = np.empty(most, dtype=np.int64), np.empty(most)
     count = 0

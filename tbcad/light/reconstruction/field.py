@@ -19,7 +19,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 from io import BytesIO
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +33,7 @@ from tbcad.light.reconstruction.marching import GLOSSY, MATT, SOFTNESS, Singles
 from tbcad.light.simulate.capture.light_field import NAME as LIGHT_FIELD
 from tbcad.light.simulate.capture.light_field import SCHEMA as LIGHT_FIELD_SCHEMA
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField
-from tbcad.types import Bools, Floats, Ints
+from tbcad.types import Bools, Floats
 
 SIDES = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
 LONGEST_LEAP = 255  # cells, that fit into a byte
@@ -62,10 +61,7 @@ class Grid:
     @staticmethod
     def about(wanted: Bools, width_mm: float) -> "Grid":
         """The nodes of all cells that have a wanted node (n, n, n)."""
-        nodes = np.zeros_like(wanted)
-        cells = _cells(wanted, np.logical_or)
-        for corner in _corners(nodes):
-            np.logical_or(corner, cells, out=corner)
+        nodes = ndimage.binary_dilation(wanted, np.ones((3, 3, 3), dtype=bool))
         return Grid(len(wanted), width_mm, np.argwhere(nodes).astype(np.uint16))
 
     def __len__(self) -> int:
@@ -89,7 +85,8 @@ class Grid:
 
         0 where it has them itself.
         """
-        whole = _cells(self.row >= 0, np.logical_and)
+        corners = np.lib.stride_tricks.sliding_window_view(self.row >= 0, (2, 2, 2))
+        whole: Bools = np.asarray(corners.all(axis=(3, 4, 5)))
         if not whole.any():
             return np.full(whole.shape, LONGEST_LEAP, dtype=np.uint8)
         away = ndimage.distance_transform_cdt(~whole, "chessboard")
@@ -121,29 +118,7 @@ class Grid:
 
 def resampled(lattice: NDArray[np.float32], n: int) -> NDArray[np.float32]:
     """A lattice (k, k, k) with n nodes along the same edges, linearly, (n, n, n)."""
-    for axis in range(3):
-        lattice = _along(lattice, n, axis)
-    return lattice
-
-
-def _along(lattice: NDArray[np.float32], n: int, axis: int) -> NDArray[np.float32]:
-    at = np.linspace(0, lattice.shape[axis] - 1, n)
-    first: Ints = np.minimum(at.astype(np.int64), lattice.shape[axis] - 2)
-    shape = [1, 1, 1]
-    shape[axis] = n
-    share = (at - first).astype(np.float32).reshape(shape)
-    return (1 - share) * lattice.take(first, axis) + share * lattice.take(first + 1, axis)
-
-
-def _corners(nodes: Bools) -> list[Bools]:
-    """Eight views of a lattice (n, n, n): a corner of each cell, (n-1, n-1, n-1)."""
-    ends = (slice(None, -1), slice(1, None))
-    return [nodes[corner] for corner in product(ends, repeat=3)]
-
-
-def _cells(nodes: Bools, together: np.ufunc) -> Bools:
-    """The eight corners of each cell, together, (n-1, n-1, n-1)."""
-    return np.asarray(together.reduce(_corners(nodes)))
+    return np.asarray(ndimage.zoom(lattice, n / len(lattice), order=1, mode="nearest"))
 
 
 @dataclass(frozen=True)
@@ -177,8 +152,9 @@ def write_field(path: Path, made: Field) -> None:
     replace_files(path.parent, {path.name: field_bytes(made)})
 
 
-def field_bytes(made: Field) -> bytes:
-    """The file of a field."""
+def field_bytes(made: Field, **more: Singles) -> bytes:
+    """The file of a field; with more arrays, of one under way, not compressed."""
+    save = np.savez if more else np.savez_compressed
     arrays = {
         "schema": np.array(SCHEMA),
         "nodes": np.array(made.grid.n),
@@ -191,7 +167,7 @@ def field_bytes(made: Field) -> bytes:
     if made.order:
         arrays["slope"] = made.values[:, MATT:]
     with BytesIO() as buffer:
-        np.savez_compressed(buffer, allow_pickle=False, **arrays)
+        save(buffer, allow_pickle=False, **arrays, **more)
         return buffer.getvalue()
 
 
@@ -203,8 +179,7 @@ def read_field(path: Path) -> Field:
         with zipfile.ZipFile(path) as archive:
             if sum(one.file_size for one in archive.infolist()) > MOST_BYTES:
                 raise ValueError("it unpacks to more than 4 GB")
-        with np.load(path, allow_pickle=False) as store:
-            return _checked({name: store[name] for name in store.files})
+        return read_arrays(path)[0]
     except InputError:
         raise
     except Exception as fault:  # zip and numpy raise many kinds
@@ -212,6 +187,13 @@ def read_field(path: Path) -> Field:
             f"{path} is no field that tbcad wrote ({fault}): write it again with "
             "`tbcad reconstruct`"
         ) from None
+
+
+def read_arrays(path: Path) -> tuple[Field, dict[str, Any]]:
+    """A field and all arrays of its file; ValueError, and what zip and numpy raise: damaged."""
+    with np.load(path, allow_pickle=False) as store:
+        arrays = {name: store[name] for name in store.files}
+    return _checked(arrays), arrays
 
 
 def _checked(arrays: dict[str, Any]) -> Field:

@@ -30,7 +30,7 @@ from tbcad.light.reconstruction.start import (
     first_state,
     hull,
 )
-from tbcad.light.simulate.parallel import chunks, in_threads
+from tbcad.light.simulate.parallel import chunks, first_then_threads, in_threads, over_chunks
 from tbcad.types import Bools, Ints, Progress
 
 PARTS = 8  # of a batch and of the nodes
@@ -91,15 +91,12 @@ def all_spans(rays: CapturedRays, grid: Grid, around_mm: float = 0.0) -> tuple[S
     leap = grid.leap
     near = min(1 + ceil(around_mm / grid.pitch_mm), LONGEST_LEAP - 1)
 
-    def part(here: slice) -> tuple[Singles, Singles]:
-        return spans(
-            rays.entry[here], rays.direction[here], rays.length[here], leap, grid.width_mm, near
-        )
+    def part(here: slice) -> Singles:
+        some = rays.entry[here], rays.direction[here], rays.length[here]
+        return np.stack(spans(*some, leap, grid.width_mm, near), axis=1)
 
-    part(slice(0, 0))  # compiled before any thread
-    found = in_threads(part, chunks(len(rays), max(-(-len(rays) // PARTS), 1)))
-    first, last = (np.concatenate(one) for one in zip(*found, strict=True))
-    return first, last
+    found = over_chunks(part, len(rays), max(-(-len(rays) // PARTS), 1))
+    return np.ascontiguousarray(found[:, 0]), np.ascontiguousarray(found[:, 1])
 
 
 def _pixels(rays: CapturedRays, grid: Grid, places: Singles) -> Pixels:
@@ -136,9 +133,7 @@ def _step(settings: Settings, state: State, progress: float, share: float, parts
             columns, settings.sparse * share,
         )  # fmt: skip
 
-    if state.step == 1:
-        part(slice(0, 0))  # compiled before any thread
-    in_threads(part, chunks(count, max(-(-count // PARTS), 1)))
+    first_then_threads(part, [slice(0, 0), *chunks(count, max(-(-count // PARTS), 1))])
     state.values = changed
 
 

@@ -21,7 +21,7 @@ from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.image_files import write_images
 from tbcad.light.simulate.parallel import over_chunks
 from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
-from tbcad.light.simulate.views.viewpoints import OwnMethod
+from tbcad.light.simulate.views.viewpoints import ViewMethod
 from tbcad.types import Bytes, Floats
 
 STRIDE = 0.45  # distances of nodes between samples
@@ -135,20 +135,15 @@ def write_preview(file: Path, made: Field) -> None:
     write_images({file: field_picture(made, at).image})
 
 
-def quick_field(source: LightField) -> Field:
-    """Fit a coarse field to all rays of a light field.
+def quick_views(source: LightField) -> Callable[[Camera], Bytes]:
+    """What makes the picture (h, w, 3) of a camera from a coarse field, fitted to all rays.
 
     InputError: none of them meets the capture sphere.
     """
     with _one_at_a_time:
         *_, last = fit(captured_rays(source), QUICK)
-    return last.field()
-
-
-def quick_views(source: LightField) -> Callable[[Camera], Bytes]:
-    """What makes the picture (h, w, 3) of a camera from a coarse field."""
-    made = quick_field(source)
+    made = last.field()
     return lambda camera: field_picture(made, camera).image
 
 
-BY_FIELD = OwnMethod("field", quick_views)
+BY_FIELD = ViewMethod("field", quick_views)

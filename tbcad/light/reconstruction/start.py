@@ -3,9 +3,7 @@
 The hull is what rays that see the background do not pass through.
 """
 
-import json
-from dataclasses import asdict, dataclass, field
-from io import BytesIO
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +14,17 @@ from scipy import ndimage
 from tbcad.common.atomic_files import replace_files
 from tbcad.common.compiled import compiled_sum
 from tbcad.errors import InputError
-from tbcad.light.reconstruction.field import Field, Grid, resampled
+from tbcad.light.reconstruction.field import (
+    Field,
+    Grid,
+    field_bytes,
+    read_arrays,
+    resampled,
+)
 from tbcad.light.reconstruction.gradient import Moments
 from tbcad.light.reconstruction.marching import GLOSSY, MATT, Singles
 from tbcad.light.reconstruction.rays import CapturedRays
-from tbcad.light.simulate.parallel import chunks, in_threads
+from tbcad.light.simulate.parallel import chunks, first_then_threads
 from tbcad.types import Bools
 
 CENTRAL = np.zeros((1, 1, 2), dtype=np.float32)
@@ -36,7 +40,6 @@ RAYS_OF_NODE = 5  # at least, in the mean
 MOST_DARK = 0.3  # share of a voxel's rays that may see the background, past its edges
 HULL_PARTS = 8  # of the rays, whatever the number of threads
 LIGHT = 0.25  # of white: no dark background is lighter
-SCHEMA = "tbcad-field-part/1"
 ANEW = "begin anew with --force"
 
 
@@ -163,9 +166,8 @@ def _inside(rays: CapturedRays, dark: Bools) -> Bools:
         _vote(rays.entry[part], rays.direction[part], rays.length[part], dark[part], scale, votes)
         return votes
 
-    count(slice(0, 0))  # compiled before any thread
-    parts = chunks(len(rays), max(-(-len(rays) // HULL_PARTS), 1))
-    total, seen_through = sum(in_threads(count, parts), np.zeros(shape, dtype=np.int64))
+    parts = [slice(0, 0), *chunks(len(rays), max(-(-len(rays) // HULL_PARTS), 1))]
+    total, seen_through = sum(first_then_threads(count, parts), np.zeros(shape, dtype=np.int64))
     return np.asarray((total > 0) & (seen_through < MOST_DARK * total))
 
 
@@ -221,28 +223,16 @@ def settings_of(record: dict[str, Any], places: Singles) -> Settings:
 
 
 def write_checkpoint(file: Path, kept: Checkpoint) -> None:
-    """Write a checkpoint, replacing the file as a whole."""
+    """Write a checkpoint, replacing the file as a whole: a field with the moments of Adam."""
     state = kept.state
     record = {
-        "schema": SCHEMA,
         "asked": kept.asked,
         "settings": settings_record(kept.settings),
         "trials": kept.trials,
         **{name: getattr(state, name) for name in ("level", "epoch", "step", "loss")},
-        "nodes": state.grid.n,
-        "width_mm": state.grid.width_mm,
     }
-    with BytesIO() as buffer:
-        np.savez(
-            buffer,
-            allow_pickle=False,
-            record=np.array(json.dumps(record)),
-            place=state.grid.place,
-            values=state.values,
-            mean=state.moments.mean,
-            square=state.moments.square,
-        )
-        replace_files(file.parent, {file.name: buffer.getvalue()})
+    made = replace(state.field(), facts=record)
+    replace_files(file.parent, {file.name: field_bytes(made, **state.moments._asdict())})
 
 
 def read_checkpoint(file: Path, asked: dict[str, Any], places: Singles) -> Checkpoint:
@@ -251,14 +241,15 @@ def read_checkpoint(file: Path, asked: dict[str, Any], places: Singles) -> Check
     InputError: it is of others, or damaged.
     """
     try:
-        with np.load(file, allow_pickle=False) as store:
-            arrays = {name: store[name] for name in store.files}
-        record = json.loads(str(arrays["record"]))
-        if record["schema"] != SCHEMA:
-            raise ValueError(f"its schema is not {SCHEMA}")
+        made, arrays = read_arrays(file)
+        record = made.facts
         check_same(file, record["asked"], asked)
-        settings = settings_of(record["settings"], places)
-        return Checkpoint(asked, settings, record["trials"], _state(record, arrays))
+        moments = Moments(arrays["mean"], arrays["square"])
+        if {one.shape for one in moments} != {made.values.shape}:
+            raise ValueError("its arrays do not belong together")
+        state = State(record["level"], record["epoch"], made.grid, made.values, moments)
+        state.step, state.loss = record["step"], record["loss"]
+        return Checkpoint(asked, settings_of(record["settings"], places), record["trials"], state)
     except InputError:
         raise
     except Exception as fault:  # zip, numpy and JSON raise many kinds
@@ -277,13 +268,3 @@ def check_same(file: Path, found: dict[str, Any], asked: dict[str, Any]) -> None
 
 def _flat(asked: dict[str, Any]) -> dict[str, Any]:
     return {**asked, **asked.get("options", {}), "options": None}
-
-
-def _state(record: dict[str, Any], arrays: dict[str, Any]) -> State:
-    grid = Grid(record["nodes"], record["width_mm"], arrays["place"])
-    values, moments = arrays["values"], Moments(arrays["mean"], arrays["square"])
-    if {one.shape for one in (values, *moments)} != {(len(grid), values.shape[1])}:
-        raise ValueError("its arrays do not belong together")
-    state = State(record["level"], record["epoch"], grid, values, moments)
-    state.step, state.loss = record["step"], record["loss"]
-    return state

@@ -24,18 +24,13 @@ from tbcad.light.reconstruction.picture import STRIDE, field_picture
 from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import ThinLens, lens_pinholes, refocus
-from tbcad.light.simulate.views.synthesis import (
-    Method,
-    horizon_search_radius,
-    search_radius,
-    synthesise,
-)
+from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.viewer.moving import moving_view
 from tbcad.light.viewer.page import Query, filled
 from tbcad.output.single_files import check_file
 from tbcad.types import Bytes, Progress
 
-MethodAtRest = Method | Literal["depth"]
+MethodAtRest = Literal["nearest", "depth"]
 View = Callable[[Camera], Bytes]  # what makes the picture (h, w, 3) of a camera
 JPEG_QUALITY = 88
 # While the view moves, a lens has 9 pinholes instead of 69, at half the width and height.
@@ -109,9 +104,8 @@ def light_field_renderer(
 ) -> Renderer:
     """Of a light field, whose file stays open: makes the pictures of all its virtual cameras."""
     pictures, reach = pinhole_pictures(tiles.source, progress), tiles.source.capture_mm
-    limits = search_radius(tiles), horizon_search_radius(tiles)
     rest = _synthesised(tiles, method, lambda: DepthViews(tiles, pictures))
-    return Renderer(method, tiles, reach, rest, lambda at: moving_view(pictures, at, limits))
+    return Renderer(method, tiles, reach, rest, lambda at: moving_view(pictures, at))
 
 
 def field_renderer(made: Field, lens: MirrorTiles | None = None) -> Renderer:
@@ -130,7 +124,7 @@ def _synthesised(
     if method == "depth":
         views = by_depth()
         return lambda view: views.of(view)[0].image
-    return lambda view: synthesise(tiles, view, method).image
+    return lambda view: synthesise(tiles, view).image
 
 
 def capture_mm(pictured: MirrorTiles | Field) -> float:

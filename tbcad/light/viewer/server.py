@@ -8,10 +8,6 @@ missing, or the host is not ours.
 import secrets
 import sys
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from io import BufferedReader, RawIOBase
-from socket import socket
-from threading import BoundedSemaphore
-from time import monotonic
 from typing import Any
 
 from tbcad.errors import InputError
@@ -21,10 +17,9 @@ from tbcad.light.viewer.render import Renderer, Superseded
 HOST = "127.0.0.1"
 NAMES = (HOST, "localhost")
 TOKEN_BYTES = 16
-# A connection is closed when its next request is not there after so many seconds, from the end of
-# the last one to the request's last header, or when an answer is not taken in this time.
+# A connection is closed when nothing of its next request comes, or of an answer is taken, for so
+# many seconds.
 TIMEOUT_S = 60.0
-MAX_CONNECTIONS = 64  # of which a browser opens six
 HEADERS = {
     "Cache-Control": "no-store",
     "Referrer-Policy": "no-referrer",
@@ -42,7 +37,6 @@ class ViewServer(ThreadingHTTPServer):
 
     daemon_threads = True
     allow_reuse_address = False
-    request_queue_size = MAX_CONNECTIONS
 
     def __init__(self, renderer: Renderer, title: str, start: Query, port: int = 0) -> None:
         """Listen on this computer alone, at a port, 0 for any; InputError if it is taken."""
@@ -52,7 +46,6 @@ class ViewServer(ThreadingHTTPServer):
         )
         self.page = page.encode("utf-8")
         self.token = secrets.token_urlsafe(TOKEN_BYTES)
-        self._free = BoundedSemaphore(MAX_CONNECTIONS)
         try:
             super().__init__((HOST, port), _Handler)
         except OSError as error:
@@ -68,67 +61,22 @@ class ViewServer(ThreadingHTTPServer):
         """What a browser that was given the address calls this server."""
         return tuple(f"{name}:{self.server_port}" for name in NAMES)
 
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Serve a connection in a thread of its own, or close it when there are too many."""
-        if self._free.acquire(blocking=False):
-            super().process_request(request, client_address)
-        else:
-            self.shutdown_request(request)
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Serve a connection to its end."""
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self._free.release()
-
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing of a connection that its client breaks off: only faults of ours are shown."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
 
 
-class _Incoming(RawIOBase):
-    """What comes in before a deadline: a client that sends a byte now and then gains no time."""
-
-    def __init__(self, connection: socket) -> None:
-        super().__init__()
-        self._connection = connection
-        self.deadline = 0.0
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        left = self.deadline - monotonic()
-        if left <= 0:
-            raise TimeoutError
-        self._connection.settimeout(left)
-        return self._connection.recv_into(buffer)
-
-
 class _Handler(BaseHTTPRequestHandler):
     server: ViewServer
     protocol_version = "HTTP/1.1"  # one connection for all views
     disable_nagle_algorithm = True
-
-    def setup(self) -> None:
-        """Read with a deadline."""
-        super().setup()
-        self.rfile.close()
-        self._incoming = _Incoming(self.connection)
-        self.rfile = BufferedReader(self._incoming)
-
-    def handle_one_request(self) -> None:
-        """Wait for a request, read and answer it."""
-        self._incoming.deadline = monotonic() + TIMEOUT_S
-        super().handle_one_request()
+    timeout = TIMEOUT_S
 
     def do_GET(self) -> None:
         """Answer with the page or a view."""
         if "Content-Length" in self.headers or "Transfer-Encoding" in self.headers:
             self.close_connection = True  # what follows is no request
-        self.connection.settimeout(TIMEOUT_S)
         if self.headers.get("Host") not in self.server.hosts:
             return self._answer(403, TEXT, b"this server answers to its own address alone\n")
         path, _, query = self.path.partition("?")

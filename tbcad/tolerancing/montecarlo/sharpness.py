@@ -26,7 +26,7 @@ from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import Reflector, SubstitutedReflector, reflectors
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.synthesis import synthesise
-from tbcad.light.simulate.views.viewpoints import ground_truths, image_quality, viewpoints_around
+from tbcad.light.simulate.views.viewpoints import image_quality, pinhole_targets, viewpoints_around
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.types import Bytes, Floats, Ints, Progress
 
@@ -175,7 +175,7 @@ def _rotated(frame: CameraFrame, residual: float, generator: np.random.Generator
 
 def _ssim(source: LightField, reference: ReferenceViews) -> Floats:
     tiles = MirrorTiles(source)
-    pictures = [synthesise(tiles, view, "nearest").image for view in reference.views]
+    pictures = [synthesise(tiles, view).image for view in reference.views]
     pairs = zip(reference.truths, pictures, strict=True)
     qualities = in_threads(lambda pair: image_quality(*pair), pairs)
     return np.array([quality.ssim for quality in qualities])
@@ -186,7 +186,7 @@ def reference_views(
 ) -> ReferenceViews:
     """The views that are compared, with their truths."""
     views = viewpoints_around(*VIEWPOINTS).cameras(capture_mm)
-    return ReferenceViews(capture_mm, views, ground_truths(scene, views, progress))
+    return ReferenceViews(capture_mm, views, pinhole_targets(scene, views, progress).truths)
 
 
 def view_ssims(specs: dict[str, Spec]) -> dict[str, float]:

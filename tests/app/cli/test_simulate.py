@@ -124,10 +124,7 @@ def test_the_method_and_why(
     view += ["--out", str(tmp_path / "v.png")]
     for more, expected in (
         ([], "method depth: a blend at the depth that is found"),
-        (["--method", "blend"], "method depth: a blend at the depth that is found"),
         (["--method", "depth"], "method depth: as --method says"),
-        (["--surface", "object"], "method blend: --surface object"),
-        (["--method", "blend", "--surface", "plane"], "method blend: as --method says"),
         (["--method", "nearest"], "method nearest: as --method says"),
     ):
         assert run([*view, *more]) == 0
@@ -156,7 +153,6 @@ def test_view_without_an_object_has_no_truth(captured: Path, tmp_path: Path) -> 
     small = ["--width", "64", "--height", "48", "--out", str(out)]
     assert run(["view", str(alone), *small]) == 0
     assert not (tmp_path / "view-truth.png").exists()
-    assert run(["view", str(alone), *small, "--method", "blend", "--surface", "object"]) == 2
 
 
 def test_refocus_and_sweep(

@@ -64,7 +64,6 @@ def test_a_field_beside_the_capture(folder: Path, capsys: pytest.CaptureFixture[
         ("--method field", "method field: as --method says"),
         ("--method depth", "method depth: as --method says"),
         ("--method nearest", "method nearest: as --method says"),
-        ("--surface plane", "method blend: --surface plane is for a blend"),
     ):
         assert viewed(folder, *words.split()) == 0
         printed = capsys.readouterr()

@@ -96,43 +96,30 @@ class TestNerfstudio:
 
 
 class TestColmap:
-    def test_binary_and_text_are_the_same(self, exported: dict[str, Path]) -> None:
-        """Read by the layout of "Output Format" of COLMAP's documentation."""
-        model = exported["colmap"] / "sparse" / "0"
-        cameras, images = _binary_cameras(model), _binary_images(model)
-        lines = _lines(model / "cameras.txt")
-        assert len(lines) == len(cameras) > 0
-        for line in lines:
-            number, kind, *values = line.split()
-            assert kind == "PINHOLE"
-            assert [float(value) for value in values] == [*cameras[int(number)]]
-        lines = _lines(model / "images.txt")
-        assert lines[1::2] == [""] * len(images)
-        for line in lines[::2]:
-            number, *values, camera, name = line.split()
-            assert images[int(number)] == (*map(float, values), int(camera), name)
-        points = np.array([line.split() for line in _lines(model / "points3D.txt")], dtype=float)
-        assert points == pytest.approx(_binary_points(model))
-
     def test_it_is_what_nerfstudio_gets(
         self, exported: dict[str, Path], transforms: Document
     ) -> None:
-        """World to camera with y down against camera to world with y up."""
+        """World to camera with y down against camera to world with y up, by its text form."""
         model = exported["colmap"] / "sparse" / "0"
         cameras, images, points = (
-            read(model) for read in (_binary_cameras, _binary_images, _binary_points)
+            [line.split() for line in _lines(model / f"{name}.txt")]
+            for name in ("cameras", "images", "points3D")
         )
+        table = np.array(points, dtype=float)
         cloud = trimesh.load(exported["nerfstudio"] / transforms["ply_file_path"])
         assert len(cloud.vertices) > 1000
-        assert np.asarray(cloud.vertices) == pytest.approx(points[:, 1:4], abs=1e-4)
-        assert (np.asarray(cloud.colors)[:, :3] == points[:, 4:7]).all()
-        for frame, image in zip(transforms["frames"], images.values(), strict=True):
-            *pose, camera, name = image
+        assert np.asarray(cloud.vertices) == pytest.approx(table[:, 1:4], abs=1e-4)
+        assert (np.asarray(cloud.colors)[:, :3] == table[:, 4:7]).all()
+        assert images[1::2] == [[]] * len(cameras)  # points without tracks
+        for frame, camera, image in zip(transforms["frames"], cameras, images[::2], strict=True):
+            number, *pose, own, name = image
+            assert (number, own) == (camera[0], camera[0])
             assert name == Path(frame["file_path"]).name
-            w, x, y, z, *shift = pose
+            w, x, y, z, *shift = map(float, pose)
             turn = Rotation.from_quat([x, y, z, w]).as_matrix()
             assert -turn.T @ shift == pytest.approx(np.array(frame["transform_matrix"])[:3, 3])
-            width, height, fx, fy, cx, cy = cameras[camera]
+            assert camera[1] == "PINHOLE"
+            width, height, fx, fy, cx, cy = map(float, camera[2:])
             point = np.array([7.0, -4.0, 5.0])
             local = turn @ point + shift
             pixel = [cx + fx * local[0] / local[2], cy + fy * local[1] / local[2]]
@@ -254,34 +241,3 @@ def _meeting(field: LightField, name: str) -> int:
 
 def _lines(path: Path) -> list[str]:
     return [one for one in path.read_text("utf-8").split("\n")[:-1] if not one.startswith("#")]
-
-
-def _binary(path: Path, row: list[tuple[Any, ...]]) -> np.ndarray:
-    """The rows of a file of COLMAP, which are all of one length, behind their number."""
-    data = path.read_bytes()
-    table = np.frombuffer(data, row, offset=8)
-    assert len(table) == int.from_bytes(data[:8], "little")
-    return table
-
-
-def _binary_cameras(model: Path) -> dict[int, tuple[float, ...]]:
-    row = [("id", "<i4"), ("kind", "<i4"), ("size", "<u8", 2), ("lens", "<f8", 4)]
-    table = _binary(model / "cameras.bin", row)
-    assert (table["kind"] == 1).all()  # PINHOLE
-    return {int(one["id"]): (*one["size"].tolist(), *one["lens"].tolist()) for one in table}
-
-
-def _binary_images(model: Path) -> dict[int, tuple[Any, ...]]:
-    """Names are as long as a0001.png, and end with a zero."""
-    row = [("id", "<i4"), ("pose", "<f8", 7), ("camera", "<i4"), ("name", "S10"), ("seen", "<u8")]
-    table = _binary(model / "images.bin", row)
-    assert not table["seen"].any()
-    return {int(one["id"]): (*one["pose"].tolist(), int(one["camera"]), one["name"].decode())
-            for one in table}  # fmt: skip
-
-
-def _binary_points(model: Path) -> np.ndarray:
-    row = [("id", "<u8"), ("place", "<f8", 3), ("colour", "u1", 3), ("off", "<f8"), ("seen", "<u8")]
-    table = _binary(model / "points3D.bin", row)
-    assert not table["seen"].any()
-    return np.column_stack([table[name] for name in ("id", "place", "colour", "off")])

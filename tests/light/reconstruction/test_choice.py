@@ -11,8 +11,6 @@ from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
 from tbcad.light.reconstruction import fit as choice
-from tbcad.light.reconstruction import fit as fitting
-from tbcad.light.reconstruction import start as starting
 from tbcad.light.reconstruction.field import Field, field_bytes
 from tbcad.light.reconstruction.fit import (
     FACTOR,
@@ -244,8 +242,8 @@ def test_threads_and_the_order_of_their_work_change_no_bit(
     for threads in (1, 3):
         monkeypatch.setattr("tbcad.light.simulate.parallel.THREADS", threads)
         found.add(field_bytes(fitted(rays_of(TWO, 6_000), settings)))
-    for module in (fitting, starting):
-        monkeypatch.setattr(module, "in_threads", backward)
+    for module in ("reconstruction.fit", "simulate.parallel"):
+        monkeypatch.setattr(f"tbcad.light.{module}.in_threads", backward)
     assert found == {field_bytes(fitted(rays_of(TWO, 6_000), settings))}
 
 

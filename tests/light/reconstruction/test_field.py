@@ -2,10 +2,8 @@
 
 import io
 import json
-import zipfile
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -87,23 +85,6 @@ def archive(**changes: object) -> bytes:
         return buffer.getvalue()
 
 
-def with_member(name: str, content: bytes) -> bytes:
-    """The file with other bytes in place of an array."""
-    with io.BytesIO() as buffer:
-        with zipfile.ZipFile(io.BytesIO(WHOLE)) as whole, zipfile.ZipFile(buffer, "w") as other:
-            for member in whole.namelist():
-                other.writestr(member, content if member == name else whole.read(member))
-        return buffer.getvalue()
-
-
-def huge_header() -> bytes:
-    """An array that claims 10^12 numbers in a few bytes."""
-    header = {"descr": "<f4", "fortran_order": False, "shape": (10**12,)}
-    with io.BytesIO() as buffer:
-        np.lib.format.write_array_header_1_0(buffer, header)
-        return buffer.getvalue()
-
-
 def bomb() -> bytes:
     """A member that says it unpacks to 5 GB."""
     content = bytearray(WHOLE)
@@ -133,8 +114,6 @@ DAMAGED = {
     "facts that are a list": archive(facts=np.array(json.dumps([1]))),
     "slopes of too few": archive(slope=np.zeros((V, 3), np.float32)),
     "pickled objects": archive(colour=np.array([{}] * V)),
-    "bytes in place of an array": with_member("density.npy", b"hello"),
-    "more than memory holds": with_member("density.npy", huge_header()),
     "a bomb": bomb(),
 }
 
@@ -273,15 +252,12 @@ def test_its_cube_is_about_the_origin() -> None:
     assert grid.pitch_mm == WIDTH / 4
 
 
-def plane(n: int) -> np.ndarray:
-    x, y, z = np.meshgrid(*[np.linspace(-1, 1, n)] * 3, indexing="ij")
-    return (1 + x + 2 * y - 3 * z).astype(np.float32)
-
-
-@pytest.mark.parametrize(("k", "n"), [(2, 9), (6, 6), (8, 44), (9, 4), (14, 86), (60, 100)])
+@pytest.mark.parametrize(("k", "n"), [(2, 9), (9, 4), (60, 100)])
 def test_linear_values_stay_linear_on_other_lattices(k: int, n: int) -> None:
+    def plane(n: int) -> np.ndarray:
+        x, y, z = np.meshgrid(*[np.linspace(-1, 1, n)] * 3, indexing="ij")
+        return (1 + x + 2 * y - 3 * z).astype(np.float32)
+
     assert np.abs(resampled(plane(k), n) - plane(n)).max() < 1e-5
-    ends = np.array(list(product([0, n // 2, n - 1], repeat=3)), np.uint16)
-    assert Grid(n, WIDTH, ends).sampled(plane(k)) == pytest.approx(
-        plane(n)[tuple(ends.T)], abs=1e-5
-    )
+    every = Grid(n, WIDTH, np.argwhere(np.ones((n,) * 3, bool)).astype(np.uint16))
+    assert every.dense(every.sampled(plane(k))) == pytest.approx(plane(n), abs=1e-5)

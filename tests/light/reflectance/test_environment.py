@@ -115,19 +115,6 @@ def test_middle_top_right_and_back(
 
 
 @EVERY
-def test_neighbouring_pixels_show_neighbouring_directions(
-    kind: LightFormat, height: int, width: int
-) -> None:
-    """Within faces and across those edges that touch in the picture: no face lies wrongly."""
-    found = pixels(kind, height, width)
-    grid = np.full((height, width, 3), np.nan)
-    grid[found.row, found.column] = found.direction
-    for axis in (0, 1):
-        step = np.linalg.norm(np.diff(grid, axis=axis), axis=2)
-        assert np.nanmax(step) < (0.4 if kind == "mirror-ball" else 0.07)
-
-
-@EVERY
 def test_the_same_surroundings_give_the_same_light(
     kind: LightFormat, height: int, width: int
 ) -> None:

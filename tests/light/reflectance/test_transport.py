@@ -33,7 +33,7 @@ from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import photograph, to_bytes
 from tbcad.light.simulate.scene.lamps import PointLights, Spots, received_light
 from tbcad.light.simulate.scene.object import SceneObject
-from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.ray_casting import Scene, depth_along_rays, prepared_scene
 from tbcad.light.simulate.scene.rays import camera_around_object, exact_tracer
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
@@ -141,15 +141,6 @@ def test_rays_to_where_a_sphere_reflects_come_to_the_points_and_spread_as_said()
         assert np.linalg.norm(np.cross(first, second)) == pytest.approx(area, rel=1e-6)
 
 
-def test_head_on_it_is_the_light_of_the_image_behind_the_mirror() -> None:
-    """A convex mirror's image of a point: 1/image = 1/distance + 2/radius."""
-    far, near = 240.0, 80.0
-    pinhole, centre = np.array([0.0, 0, far]), np.array([0.0, 0, -RADIUS])
-    _, spread = reflected(centre, RADIUS, pinhole, np.array([[0.0, 0, near]]))
-    image = 1 / (1 / far + 2 / RADIUS)
-    assert spread == pytest.approx([(far / image * (image + near)) ** 2])
-
-
 def flat_mirror(owner: int) -> MirrorPixels:
     """The plane z = 60 over the origin; all pixels belong to one mirror."""
     radius = 1 / LEAST_CURVATURE
@@ -243,8 +234,9 @@ def test_views_are_like_ray_traced_ones(mirrors: Path, hdr: Path, scene: Scene) 
     view = camera_around_object(0.5, 0.6, 640.0, 60.0, (160, 120))
     with LightField.open(mirrors) as source, open_reflectance(mirrors) as reflectance:
         found = relit(source, reflectance, light)
-        image = synthesise(MirrorTiles(found.field), view, "blend").image
-        before = synthesise(MirrorTiles(source), view, "blend").image
+        depth = depth_along_rays(scene)
+        image = synthesise(MirrorTiles(found.field), view, depth).image
+        before = synthesise(MirrorTiles(source), view, depth).image
     lights = light.far_lights(TRUE_LIGHTS), found.lamps
     truths = [
         to_bytes(pinhole_picture(lit_scene(scene, one, found.exposure), view, 2)) for one in lights

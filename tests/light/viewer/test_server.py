@@ -1,12 +1,9 @@
 """The server of views and its queries: its own page is answered, all else refused."""
 
-import itertools
 import socket
 import struct
 import threading
-import time
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
 from http.client import HTTPConnection, HTTPResponse
 from io import BytesIO
 
@@ -20,7 +17,7 @@ from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import ThinLens, refocus
 from tbcad.light.viewer.page import Query, limits, parse_query
 from tbcad.light.viewer.render import Renderer
-from tbcad.light.viewer.server import HOST, MAX_CONNECTIONS, ViewServer
+from tbcad.light.viewer.server import HOST, ViewServer
 
 CAPTURE_MM = 60.0
 SMALL = "width=160&height=120"
@@ -188,13 +185,6 @@ def everything(connection: socket.socket) -> bytes:
         return file.read()
 
 
-def all_are_served(server: ViewServer) -> None:
-    """Wait until no connection is served any more: then all that could be printed is."""
-    for _ in range(MAX_CONNECTIONS):
-        assert server._free.acquire(timeout=600)
-    server._free.release(MAX_CONNECTIONS)
-
-
 @pytest.mark.parametrize(
     "sent",
     [b"", b"GE", b"GET / HTTP/1.1\r\nHost: x\r\n", "page", "view", b"\0\xff\xfe" * 9 + b"\r\n\r\n"],
@@ -206,49 +196,19 @@ def test_a_client_that_resets_is_no_error(
         path = f"/{server.token}/" + (f"view?{SMALL}" if sent == "view" else "")
         sent = head(server, path)
     reset(raw(server, sent))
-    all_are_served(server)
-    assert capfd.readouterr() == ("", "")
     assert get(server, f"/{server.token}/")[0].status == 200
+    assert capfd.readouterr() == ("", "")
 
 
-def test_a_client_that_takes_no_answer_is_let_go(
+def test_a_client_that_sends_nothing_is_let_go(
     server: ViewServer, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("tbcad.light.viewer.server.TIMEOUT_S", 0.2)
-    monkeypatch.setattr(server, "page", bytes(50_000_000))  # more than the system keeps
-    with raw(server, head(server, f"/{server.token}/")):
-        all_are_served(server)
+    monkeypatch.setattr("tbcad.light.viewer.server._Handler.timeout", 0.2)
+    assert everything(raw(server, b"GET")) == b""
     assert capfd.readouterr() == ("", "")
-
-
-def test_a_client_that_sends_a_byte_now_and_then_gains_no_time(
-    server: ViewServer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    clock = itertools.count(0.0, 7.0)  # seconds, asked at each read
-    monkeypatch.setattr("tbcad.light.viewer.server.monotonic", lambda: next(clock))
-    with raw(server, b"") as connection, suppress(ConnectionError):
-        for byte in itertools.repeat(b"G"):  # the time limit of the socket ends a test that fails
-            connection.sendall(byte)
-            time.sleep(0.001)
-    all_are_served(server)
-
-
-def test_a_client_that_has_sent_all_gets_its_answer(server: ViewServer) -> None:
-    connection = raw(server, head(server, f"/{server.token}/"))
-    connection.shutdown(socket.SHUT_WR)
-    assert everything(connection).startswith(b"HTTP/1.1 200")
 
 
 def test_what_follows_a_request_with_a_body_is_no_request(server: ViewServer) -> None:
     body = head(server, f"/{server.token}/")
     connection = raw(server, head(server, "/", f"Content-Length: {len(body)}") + body)
     assert everything(connection).count(b"HTTP/1.1") == 1
-
-
-def test_more_connections_than_are_allowed_are_closed(server: ViewServer) -> None:
-    with ExitStack() as stack:
-        for _ in range(MAX_CONNECTIONS):
-            stack.enter_context(raw(server, b"GET"))
-        assert everything(raw(server, b"")) == b""
-    all_are_served(server)
-    assert get(server, f"/{server.token}/")[0].status == 200

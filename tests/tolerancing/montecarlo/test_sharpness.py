@@ -14,8 +14,8 @@ from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import camera_around_object, exact_tracer, reflect_pixels
 from tbcad.light.simulate.scene.reflector import Reflector, reflectors
-from tbcad.light.simulate.views.viewpoints import ground_truths
-from tbcad.tolerancing.montecarlo.coverage import pointing
+from tbcad.light.simulate.views.viewpoints import pinhole_targets
+from tbcad.tolerancing.montecarlo.coverage import mirror_coverage, pointing
 from tbcad.tolerancing.montecarlo.draws import draw
 from tbcad.tolerancing.montecarlo.edge_model import edge_model
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
@@ -68,7 +68,7 @@ def reference(scene: Scene) -> ReferenceViews:
     views: list[Camera] = [
         camera_around_object(a, e, 640.0, CAPTURE_MM, size=SIZE) for a, e in places
     ]
-    return ReferenceViews(CAPTURE_MM, views, ground_truths(scene, views, lambda _: None))
+    return ReferenceViews(CAPTURE_MM, views, pinhole_targets(scene, views).truths)
 
 
 def builds(cameras: Cameras, errors: Errors, count: int = 1):  # type: ignore[no-untyped-def]

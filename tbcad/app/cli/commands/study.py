@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tbcad.core.spec.design import Spec
     from tbcad.light.simulate.capture.photograph import Sensor
     from tbcad.light.simulate.scene.object import SceneObject
-    from tbcad.light.simulate.views.viewpoints import StudyMethod
+    from tbcad.light.simulate.views.viewpoints import ViewMethod
 
 study = typer.Typer(
     no_args_is_help=True,
@@ -39,7 +39,7 @@ Last = Annotated[int, typer.Option("--to", metavar="N")]
 Sensors = Annotated[list[str] | None, typer.Option("--sensor", metavar="WxH")]
 """Width x height, pixels; repeatable. By default the sensor of the design, and half, twice and four
 times its width and height (Table II)."""
-Azimuths = Annotated[int, typer.Option()]
+Azimuths = Annotated[int, typer.Option(min=1, max=360)]
 """Number of azimuths at each elevation."""
 
 
@@ -91,19 +91,26 @@ def elevation_command(spec: "Spec") -> Work:
     return partial(elevation, spec)
 
 
+BlurPxOption = Annotated[float, typer.Option(min=0.01, max=1000)]
+"""Largest blur circle, in pixels."""
+PixelUmOption = Annotated[float, typer.Option(min=0.01, max=1000)]
+"""Width of a pixel, micrometres."""
+WideOpenOption = Annotated[float, typer.Option(min=0.1, max=1000)]
+"""Smallest f-number of the lens."""
+
+
 @study.command("depth-of-field")
 @of_design
 def depth_command(
     spec: "Spec",
-    blur_px: Annotated[float, typer.Option(help="Largest blur circle, in pixels.")] = 1.0,
-    pixel_um: Annotated[float, typer.Option(help="Width of a pixel, micrometres.")] = 3.45,
-    wide_open: Annotated[float, typer.Option(help="Smallest f-number of the lens.")] = 2.8,
+    blur_px: BlurPxOption = 1.0,
+    pixel_um: PixelUmOption = 3.45,
+    wide_open: WideOpenOption = 2.8,
 ) -> Work:
     """Find the depth of the virtual images, and the f-number that a lens needs (section 6)."""
     from tbcad.studies.depth_of_field import LensOptions, depth_of_field
 
-    optics = LensOptions(blur_px, pixel_um, wide_open).checked()
-    return partial(depth_of_field, spec, optics)
+    return partial(depth_of_field, spec, LensOptions(blur_px, pixel_um, wide_open))
 
 
 @study.command("ssim")
@@ -130,7 +137,7 @@ def ssim_command(
     return partial(ssim, spec, subject, simulated, places, _by(method))
 
 
-NsOption = Annotated[list[int] | None, typer.Option("--n")]
+NsOption = Annotated[list[int] | None, typer.Option("--n", min=2, max=60)]
 """Subdivision; repeatable. By default eight from 6 to 33."""
 
 
@@ -141,14 +148,14 @@ def balance_command(
     ns: NsOption = None,
     method: MethodOfStudy = "nearest",
     views: Annotated[
-        int, typer.Option(help="Number of viewpoints, evenly over the hemisphere.")
+        int, typer.Option(min=1, max=1000, help="Number of viewpoints, evenly over the hemisphere.")
     ] = 12,
     distance: Distance = 640.0,
 ) -> Work:
     """Find which balance of virtual cameras and pixels is best for which object (section 6)."""
-    from tbcad.studies.balance import balance, parse_subdivisions
+    from tbcad.studies.balance import SUBDIVISIONS, balance
 
-    wanted = parse_subdivisions(ns)
+    wanted = tuple(sorted(set(ns or SUBDIVISIONS)))
     return partial(balance, spec, wanted, views, distance, _by(method))
 
 
@@ -179,9 +186,9 @@ def prototype_command(
     return partial(prototype_vs_shell, export, subject, places, _by(method), samples)
 
 
-FilterPxOption = Annotated[list[float] | None, typer.Option(metavar="PX")]
+FilterPxOption = Annotated[list[float] | None, typer.Option(min=0.01, max=16, metavar="PX")]
 """Separation of the filter's four images, pixels; repeatable. By default 0.75, 1 and 2."""
-LensPxOption = Annotated[list[float] | None, typer.Option(metavar="PX")]
+LensPxOption = Annotated[list[float] | None, typer.Option(min=0.01, max=16, metavar="PX")]
 """Diameter of a lens's blur circle, pixels; repeatable. By default 2.4, the least that the depth of
 field allows."""
 
@@ -211,7 +218,7 @@ def low_pass_command(
     usual = BlurOptions()
     options = BlurOptions(
         tuple(filter_px or usual.separations_px), tuple(lens_px or usual.lens_px), samples
-    ).checked()
+    )
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = _subject(object_file, export.capture_mm, paint, up, unit)
@@ -229,12 +236,12 @@ def calibration_command(folder: Path) -> Work:
     return partial(calibration_study, export)
 
 
-def _by(method: MethodOfStudy) -> "StudyMethod":
-    if method != "field":
-        return method
+def _by(method: MethodOfStudy) -> "ViewMethod":
+    from tbcad.light.depth.depth_map import BY_DEPTH
     from tbcad.light.reconstruction.picture import BY_FIELD
+    from tbcad.light.simulate.views.viewpoints import BY_NEAREST
 
-    return BY_FIELD
+    return {by.name: by for by in (BY_NEAREST, BY_DEPTH, BY_FIELD)}[method]
 
 
 def _subject(

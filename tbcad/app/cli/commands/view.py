@@ -3,7 +3,7 @@
 from functools import partial
 from math import isnan, radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -13,7 +13,6 @@ from tbcad.app.cli.commands.refocus import (
     check_beside,
     check_pictures,
     field_view,
-    has_object,
     scene_of,
     true_picture,
     viewpoint_of,
@@ -50,24 +49,14 @@ if TYPE_CHECKING:
 # Shadows of all lamps are traced for each ray of a pixel: fewer than in the built-in light.
 LIT_SAMPLES = 2
 
-Surface = Literal["plane", "depth", "object"]
 LightFormat = Literal["latlong", "angular", "mirror-ball", "cross"]
+AS_ASKED = "as --method says"
+BY_DEFAULT = {
+    "field": "its file is in the capture's folder",
+    "depth": "a blend at the depth that is found",
+}
 
 
-class _Choice(NamedTuple):
-    """Method and surface of a view, and in words why."""
-
-    method: str
-    surface: Surface | None
-    reason: str
-
-
-BY_DEFAULT = _Choice("field", None, "its file is in the capture's folder")
-
-
-SurfaceOption = Annotated[Surface | None, typer.Option()]
-"""Surface of the points that are compared by blend: the depth that the light field itself shows
-(the default), the plane through the centre of the object, or the object itself."""
 DepthFilesOption = Annotated[list[Path] | None, typer.Option("--depth", metavar="FILE")]
 """Also write the depth that is found: as PNG of 16 bits, or as points (PLY); repeatable."""
 NormalsFileOption = Annotated[Path | None, typer.Option("--normals", metavar="FILE")]
@@ -92,7 +81,6 @@ def view(
     distance: Distance = 640.0,
     out: OutPicture[Path] = Path("view.png"),
     method: MethodOfView = None,
-    surface: SurfaceOption = None,
     depth_files: DepthFilesOption = None,
     normals_file: NormalsFileOption = None,
     opacity_file: OpacityFileOption = None,
@@ -116,8 +104,9 @@ def view(
     of_field = [("normals", normals_file)] if normals_file else []
     of_field += [("opacity", opacity_file)] if opacity_file else []
     beside = [*(("depth", file) for file in depth_files or ()), *of_field]
-    by_default = method is None and surface is None and light is None
-    choice = _choice("field" if by_default and of_field else method, surface)
+    by_default = method is None and light is None
+    asked = "field" if by_default and of_field else method
+    chosen = asked or "depth"
     from tbcad.light.reconstruction.field import wanted_field
     from tbcad.light.reflectance.environment import read_environment
     from tbcad.light.simulate.capture.light_field import LightField
@@ -126,12 +115,10 @@ def view(
     from tbcad.light.simulate.views.viewpoints import image_quality
 
     check_pictures(capture_folder, out, force, light)
-    check_beside(beside, out, choice.method, force, (capture_folder, light))
-    _check_light(light, light_turn, light_format, choice)
-    if frame is not None and (light is not None or surface == "object"):
-        raise InputError("--frame has its own light and place: leave out --light and --surface")
-    if choice.surface == "object" and not has_object(capture_folder):
-        raise InputError(f"{capture_folder} has no object: leave out --surface object")
+    check_beside(beside, out, chosen, force, (capture_folder, light))
+    _check_light(light, light_turn, light_format, chosen)
+    if frame is not None and light is not None:
+        raise InputError("--frame has its own light: leave out --light")
     wanted = None if light is None else read_environment(light, radians(light_turn), light_format)
     with stages(3) as screen, LightField.open(capture_folder) as stored:
         screen.stage("light field")
@@ -140,21 +127,20 @@ def view(
         scene, tiles = scene_of(capture_folder), MirrorTiles(source)
         relit = None if wanted is None else _relit(capture_folder, source, wanted)
         shown = tiles if relit is None else MirrorTiles(relit.field)
-        asked = None if by_default and not of_field else choice.method
-        made = wanted_field(asked, capture_folder, source, frame)
-        choice = BY_DEFAULT if made is not None and asked is None else choice
+        made = wanted_field(asked if by_default else chosen, capture_folder, source, frame)
         screen.stage("view")
         if made is not None:
             picture = field_view(made, at, beside)
         else:
-            picture = _view((tiles, shown), at, choice, scene, beside, screen.detail)
+            picture = _view((tiles, shown), at, chosen, beside, screen.detail)
         screen.stage("truth")
         turned = None if frame is None else (capture_folder, frame)
         truth, same_lamps = _truths(scene, at, turned, relit, wanted)
-    typer.echo(f"method {choice.method}: {choice.reason}")
+    chosen = "field" if made is not None else chosen
+    typer.echo(f"method {chosen}: {AS_ASKED if asked else BY_DEFAULT[chosen]}")
     if relit is not None:
         typer.echo(f"light {light}: by {len(relit.lamps.place)} lamps")
-    write_compared(out, picture, truth, (choice.method, "ray-traced"))
+    write_compared(out, picture, truth, (chosen, "ray-traced"))
     if same_lamps is not None:
         ssim = image_quality(same_lamps, picture).ssim
         if not isnan(ssim):
@@ -196,65 +182,36 @@ def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit"
         return relit(source, reflectance, wanted)
 
 
-def _check_light(
-    light: Path | None, turn: float, kind: LightFormat | None, choice: _Choice
-) -> None:
+def _check_light(light: Path | None, turn: float, kind: LightFormat | None, method: str) -> None:
     if light is None and turn:
         raise InputError(f"--light-turn {turn:g} turns no light: add --light")
     if light is None and kind is not None:
         raise InputError(f"--light-format {kind} is of no light: add --light")
-    if light is not None and choice.method == "field":
+    if light is not None and method == "field":
         raise InputError(f"--light {light}: a field has its own light: leave out --method field")
-
-
-def _choice(method: str | None, surface: Surface | None) -> _Choice:
-    """What is wanted: a blend at the depth that is found, if nothing is said and found.
-
-    InputError: method and surface exclude each other.
-    """
-    if method in ("nearest", "field") and surface is not None:
-        raise InputError(f"--method {method} asks for no surface: leave out --surface {surface}")
-    if method == "depth" and surface not in (None, "depth"):
-        raise InputError(
-            f"--method depth finds the surface itself: leave out --surface {surface}, or choose "
-            "--method blend"
-        )
-    if method in ("nearest", "field"):
-        return _Choice(method, None, "as --method says")
-    if surface in ("plane", "object"):
-        reason = f"--surface {surface} is for a blend" if method is None else "as --method says"
-        return _Choice("blend", surface, reason)
-    reason = "as --method says" if method == "depth" else "a blend at the depth that is found"
-    return _Choice("depth", "depth", reason)
 
 
 def _view(
     fields: tuple["MirrorTiles", "MirrorTiles"],
     at: "Camera",
-    choice: _Choice,
-    scene: "Scene | None",
+    method: str,
     beside: Beside,
     progress: "Progress",
 ) -> "Bytes":
-    """The picture by nearest rays or blended, and files of the depth that is found for it.
+    """The picture by nearest rays or by depth, and files of the depth that is found for it.
 
     The fields are the light field, and the one of the same rays whose colours are shown.
     """
     from tbcad.light.depth.depth_map import depth_views
-    from tbcad.light.simulate.scene.ray_casting import depth_along_rays
     from tbcad.light.simulate.views.synthesis import synthesise
 
     tiles, shown = fields
-    if choice.method == "nearest":
+    if method == "nearest":
         return synthesise(shown, at).image
-    if choice.surface == "depth":
-        picture, found = depth_views(tiles, progress=progress).of(at, shown)
-        ply = partial(found.ply, picture.image)
-        write_beside(beside, {"depth.png": found.png, "depth.ply": ply})
-        return picture.image
-    on_object = scene is not None and choice.surface == "object"
-    depth = depth_along_rays(scene) if scene is not None and on_object else None
-    return synthesise(shown, at, "blend", depth).image
+    picture, found = depth_views(tiles, progress=progress).of(at, shown)
+    ply = partial(found.ply, picture.image)
+    write_beside(beside, {"depth.png": found.png, "depth.ply": ply})
+    return picture.image
 
 
 tell_options(__name__)

@@ -28,7 +28,6 @@ class MirrorTile:
     origin: NDArray[np.float32]  # of the rays, mm, (n, 3)
     direction: NDArray[np.float32]  # of the rays, (n, 3)
     pinhole: Floats  # point that the rays come nearest to, the virtual camera's, mm, (3,)
-    spread: float  # largest distance of a ray from that point, mm
     middle: int  # number of the mirror's pixel nearest to the middle of the rectangle
 
 
@@ -111,11 +110,11 @@ def _tile(frame: CameraFrame, index: int) -> MirrorTile | None:
     height, width = valid.shape
     valid = valid.ravel()
     colour, origin, direction = (np.pad(one, BORDER).reshape(-1, 3) for one in found[1])
-    pinhole, spread = convergence_point(origin[valid], direction[valid])
+    pinhole, _ = convergence_point(origin[valid], direction[valid])
     pixel = np.flatnonzero(valid)
     row, column = np.divmod(pixel, width)
     middle = int(pixel[((2 * row - height) ** 2 + (2 * column - width) ** 2).argmin()])
-    return MirrorTile((height, width), valid, colour, origin, direction, pinhole, spread, middle)
+    return MirrorTile((height, width), valid, colour, origin, direction, pinhole, middle)
 
 
 def convergence_point(

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,6 @@ BLOCK_PX = 8
 # So many target rays, in a row, are looked at together to find the mirrors near a view.
 RAYS_PER_BOX = 1024
 
-Method = Literal["nearest", "blend"]
 Rays = tuple[Floats, Floats]  # origins and unit directions, (n, 3) each
 DepthFunction = Callable[[Floats, Floats], Floats]
 """Distance (n,) along rays with origins and unit directions (n, 3) to a surface, mm."""
@@ -58,21 +56,21 @@ class SynthesisedView:
 
 
 def synthesise(
-    tiles: MirrorTiles, view: Camera, method: Method = "nearest", depth: DepthFunction | None = None
+    tiles: MirrorTiles, view: Camera, depth: DepthFunction | None = None
 ) -> SynthesisedView:
     """The picture that a pinhole camera would see.
 
-    By the nearest captured ray (section 4.2), or a blend of several virtual cameras on the surface
-    `depth`; without one, on the plane through the origin that faces the camera.
+    By a blend of several virtual cameras on the surface `depth`; without one by the nearest
+    captured ray (section 4.2).
     """
     pixels, rays = _rays_of_view(tiles, view)
     two_plane = two_plane_along(view.forward, view.right, tiles.source.capture_mm)
     bundle = nearby_rays(tiles, two_plane, rays, search_radius(tiles))
-    colours, seen = ray_colours(bundle, rays, method, depth)
+    colours, seen = ray_colours(bundle, rays, depth)
     if not seen.all():
         rest = (rays[0][~seen], rays[1][~seen])
         bundle = nearby_rays(tiles, two_plane, rest, horizon_search_radius(tiles))
-        colours[~seen], seen[~seen] = ray_colours(bundle, rest, method, depth)
+        colours[~seen], seen[~seen] = ray_colours(bundle, rest, depth)
     shape = view.height_px, view.width_px
     picture, complete = np.zeros((*shape, 3), dtype=np.float32), np.ones(shape, dtype=bool)
     picture.reshape(-1, 3)[pixels], complete.reshape(-1)[pixels] = colours, seen
@@ -142,21 +140,19 @@ def nearby_rays(
 
 
 def ray_colours(
-    bundle: RayBundle | None,
-    rays: Rays,
-    method: Method = "nearest",
-    depth: DepthFunction | None = None,
+    bundle: RayBundle | None, rays: Rays, depth: DepthFunction | None = None
 ) -> tuple[Colours, Bools]:
-    """Colours (n, 3) of target rays, and which of them were seen, (n,)."""
+    """Colours (n, 3) of target rays as of `synthesise`, and which of them were seen, (n,)."""
     count = len(rays[0])
     if bundle is None:
         return np.zeros((count, 3), dtype=np.float32), np.zeros(count, dtype=bool)
     targets = bundle.two_plane.coordinates(*rays)
-    if method == "nearest":
+    if depth is None:
         pixels = nearest_rays(bundle, targets)
         seen = pixels >= 0
         return np.where(seen[:, None], bundle.colour[pixels], np.float32(0)), seen
-    colour, seen = blend_cameras(bundle, targets, _depths(bundle.two_plane, rays, depth))
+    along = bundle.two_plane.axes[2] / bundle.two_plane.scale
+    colour, seen = blend_cameras(bundle, targets, _places(along, *rays, depth(*rays)))
     return colour.astype(np.float32), seen
 
 
@@ -187,13 +183,6 @@ def _near_mirrors(tiles: MirrorTiles, two_plane: TwoPlane, targets: Floats, limi
     behind = np.flatnonzero(place[:, 2] < 0)
     pinholes = np.column_stack([place[behind], tiles.width[behind]])
     return behind[mirrors_near_boxes(pinholes, boxes_around(targets, RAYS_PER_BOX), limit)]
-
-
-def _depths(two_plane: TwoPlane, rays: Rays, depth: DepthFunction | None) -> Floats:
-    """Where rays meet the surface, along the view over s, (n,); 0 where they do not."""
-    if depth is None:
-        return np.zeros(len(rays[0]))
-    return _places(two_plane.axes[2] / two_plane.scale, *rays, depth(*rays))
 
 
 @compiled

@@ -3,19 +3,19 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
-from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import to_bytes
 from tbcad.light.simulate.scene.ray_casting import Scene, depth_along_rays
 from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import GOLDEN_ANGLE, pinhole_picture
-from tbcad.light.simulate.views.synthesis import Method, synthesise
+from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.types import Bools, Bytes, Floats, Progress
 
 # Blurs that are tried, standard deviations of a Gaussian in pixels, and how finely.
@@ -23,7 +23,6 @@ BLUR_RANGE_PX = (0.05, 20.0)
 BLUR_STEP_PX = 0.01
 SSIM_SIGMA, SSIM_RADIUS = 1.5, 5  # of SSIM's window, pixels
 ELEVATIONS_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
-MAX_AZIMUTHS, MAX_VIEWS = 360, 1000
 # What is measured of a view: SSIM over the frame and where the object is; standard deviation of
 # the Gaussian that blurs the truth as the view is blurred, at the object's centre; object's share.
 QUALITY = ("psnr_db", "ssim", "ssim_on_object", "blur_mm", "object_share")
@@ -103,10 +102,10 @@ def equivalent_blur_px(truth: Bytes, picture: Bytes) -> float:
 
 
 @dataclass(frozen=True)
-class OwnMethod:
-    """How views are made, by a room above this one."""
+class ViewMethod:
+    """How the views of a light field are made."""
 
-    name: str  # of the method
+    name: str
     # of a light field: what makes the picture (h, w, 3) of a camera
     views: Callable[[LightField], Callable[[Camera], Bytes]]
 
@@ -114,7 +113,12 @@ class OwnMethod:
         return self.name
 
 
-StudyMethod = Method | OwnMethod
+def _nearest(source: LightField) -> Callable[[Camera], Bytes]:
+    tiles = MirrorTiles(source)
+    return lambda view: synthesise(tiles, view).image
+
+
+BY_NEAREST = ViewMethod("nearest", _nearest)
 
 
 @dataclass(frozen=True)
@@ -141,80 +145,63 @@ class Viewpoints:
 def viewpoints_around(
     elevations_deg: tuple[float, ...], azimuths: int, distance_mm: float
 ) -> Viewpoints:
-    """Viewpoints at some elevations, and at each a number of azimuths evenly around the object.
-
-    InputError: there are none or too many.
-    """
-    if not 1 <= azimuths <= MAX_AZIMUTHS:
-        raise InputError(
-            f"--azimuths {azimuths}: allowed is 1 to {MAX_AZIMUTHS} viewpoints around the object"
-        )
+    """Viewpoints at some elevations, and at each a number of azimuths evenly around the object."""
     around = np.arange(azimuths) * 360.0 / azimuths
     elevation, azimuth = (x.ravel() for x in np.meshgrid(elevations_deg, around, indexing="ij"))
     return Viewpoints(elevation, azimuth, distance_mm)
 
 
 def viewpoints_over_hemisphere(count: int, distance_mm: float) -> Viewpoints:
-    """Viewpoints evenly over the hemisphere, in no plane of symmetry (Vogel's spiral).
-
-    InputError: there are none or too many.
-    """
-    if not 1 <= count <= MAX_VIEWS:
-        raise InputError(f"--views {count}: allowed is 1 to {MAX_VIEWS} viewpoints")
+    """Viewpoints evenly over the hemisphere, in no plane of symmetry (Vogel's spiral)."""
     step = np.arange(count) + 0.5
     elevation = np.degrees(np.arcsin(step / count))
     return Viewpoints(elevation, np.degrees(GOLDEN_ANGLE * step) % 360, distance_mm)
 
 
-def ground_truths(scene: Scene, views: list[Camera], progress: Progress) -> list[Bytes]:
-    """What a real camera would see from each viewpoint, (h, w, 3)."""
+@dataclass(frozen=True)
+class ViewTargets:
+    """What real cameras would see of a scene."""
+
+    scene: Scene
+    cameras: list[Camera]
+    truths: list[Bytes]  # from each, (h, w, 3)
+
+    @cached_property
+    def masks(self) -> list[Bools]:
+        """Which pixels of each camera's picture show the object, (h, w)."""
+        depth, masks = depth_along_rays(self.scene), []
+        for view in self.cameras:
+            direction = view_directions(view)
+            origin = np.broadcast_to(view.pinhole, direction.shape)
+            distance = depth(origin.reshape(-1, 3), direction.reshape(-1, 3))
+            masks.append(np.isfinite(distance).reshape(direction.shape[:2]))
+        return masks
+
+    def quality(
+        self, picture_of: Callable[[Camera], Bytes], progress: Progress
+    ) -> dict[str, Floats]:
+        """Pictures (h, w, 3) against the truth from each camera: QUALITY, each (v,)."""
+        rows = []
+        for k, view in enumerate(self.cameras):
+            progress(f"view {k + 1} of {len(self.cameras)}")
+            rows.append(_quality(view, self.truths[k], picture_of(view), self.masks[k]))
+        return dict(zip(QUALITY, np.array(rows).T, strict=True))
+
+
+def pinhole_targets(
+    scene: Scene, cameras: list[Camera], progress: Progress = lambda _: None
+) -> ViewTargets:
+    """What pinhole cameras would see, ray-traced."""
     truths = []
-    for k, view in enumerate(views):
-        progress(f"truth {k + 1} of {len(views)}")
+    for k, view in enumerate(cameras):
+        progress(f"truth {k + 1} of {len(cameras)}")
         truths.append(to_bytes(pinhole_picture(scene, view)))
-    return truths
+    return ViewTargets(scene, cameras, truths)
 
 
-def object_masks(scene: Scene, views: list[Camera]) -> list[Bools]:
-    """Which pixels of each viewpoint's picture show the object, (h, w)."""
-    depth = depth_along_rays(scene)
-    masks = []
-    for view in views:
-        direction = view_directions(view)
-        origin = np.broadcast_to(view.pinhole, direction.shape)
-        distance = depth(origin.reshape(-1, 3), direction.reshape(-1, 3))
-        masks.append(np.isfinite(distance).reshape(direction.shape[:2]))
-    return masks
-
-
-def views_by(method: StudyMethod, tiles: MirrorTiles, scene: Scene) -> Callable[[Camera], Bytes]:
-    """What makes the picture (h, w, 3) of a camera; a blend takes the depth of the scene."""
-    if isinstance(method, OwnMethod):
-        return method.views(tiles.source)
-    depth = depth_along_rays(scene) if method == "blend" else None
-    return lambda view: synthesise(tiles, view, method, depth).image
-
-
-def view_quality(
-    tiles: MirrorTiles,
-    scene: Scene,
-    views: list[Camera],
-    truths: list[Bytes],
-    method: StudyMethod,
-    progress: Progress,
-) -> dict[str, Floats]:
-    """The light field's views against the truth at each viewpoint: QUALITY, each (v,)."""
-    picture_of, masks, qualities = views_by(method, tiles, scene), object_masks(scene, views), []
-    for k, (view, truth, mask) in enumerate(zip(views, truths, masks, strict=True)):
-        progress(f"view {k + 1} of {len(views)}")
-        qualities.append(picture_quality(view, truth, picture_of(view), mask))
-    return {name: np.array([quality[name] for quality in qualities]) for name in QUALITY}
-
-
-def picture_quality(view: Camera, truth: Bytes, picture: Bytes, mask: Bools) -> dict[str, float]:
+def _quality(view: Camera, truth: Bytes, picture: Bytes, mask: Bools) -> tuple[float, ...]:
     """QUALITY of one view; `mask` (h, w): where the truth shows the object."""
     quality, about = image_quality_map(truth, picture)
     blur_mm = equivalent_blur_px(truth, picture) * view.pixel_pitch * float(norm(view.pinhole))
     on_object = float(about[mask].mean()) if mask.any() else np.nan
-    values = (quality.psnr_db, quality.ssim, on_object, blur_mm, float(mask.mean()))
-    return dict(zip(QUALITY, values, strict=True))
+    return quality.psnr_db, quality.ssim, on_object, blur_mm, float(mask.mean())

@@ -200,7 +200,6 @@ for (const part of document.querySelectorAll(".lens")) part.hidden = !data.lens;
 const [moving, atRest] = {
   field: ["the field in larger steps", "the field"],
   depth: ["the nearest virtual cameras", "a blend at the depth that is found"],
-  blend: ["the nearest virtual cameras", "a blend on the plane"],
   nearest: ["the nearest virtual cameras", "nearest rays"],
 }[data.method];
 const [few, many] = data.lens ? [", or 9 pinholes of the lens at half size", ", or 69 pinholes"] : ["", ""];

@@ -43,7 +43,7 @@ def test_views_resemble_the_truth_and_blends_more_so(
     view = view_from(azimuth, elevation)
     truth = to_bytes(pinhole_picture(knot, view))
     plain = image_quality(truth, synthesise(tiles, view).image)
-    blended = image_quality(truth, synthesise(tiles, view, "blend", depth_along_rays(knot)).image)
+    blended = image_quality(truth, synthesise(tiles, view, depth_along_rays(knot)).image)
     turned = image_quality(
         truth, to_bytes(pinhole_picture(knot, view_from(azimuth + 20, elevation)))
     )
@@ -54,14 +54,14 @@ def test_views_resemble_the_truth_and_blends_more_so(
 
 @pytest.mark.parametrize("method", ["nearest", "depth"])
 def test_from_python_it_is_the_view_of_the_command(
-    tiles: MirrorTiles, light_field: LightField, method: Literal["nearest", "blend", "depth"]
+    tiles: MirrorTiles, light_field: LightField, method: Literal["nearest", "depth"]
 ) -> None:
     """`tbcad.view`, by default at the depth that is found, and what a notebook shows of it."""
     view = view_from(20, 60)
     if method == "depth":
         expected, found = depth_views(tiles).of(view)[0], tbcad.view(light_field, 20, 60, size=SIZE)
     else:
-        expected = synthesise(tiles, view, method)
+        expected = synthesise(tiles, view)
         found = tbcad.view(light_field, 20, 60, size=SIZE, method=method)
     assert np.array_equal(found.colour, expected.colour)
     views = tbcad.Views(light_field)
@@ -74,14 +74,14 @@ def test_from_python_it_is_the_view_of_the_command(
 
 
 def test_the_number_of_threads_does_not_matter(
-    tiles: MirrorTiles, monkeypatch: pytest.MonkeyPatch
+    tiles: MirrorTiles, knot: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    view = view_from(50, 30)
-    before = synthesise(tiles, view, "blend").colour
+    view, depth = view_from(50, 30), depth_along_rays(knot)
+    before = synthesise(tiles, view, depth).colour
     focus = ThinLens(200, 0)
     mean = refocus(tiles, view, focus).colour
     monkeypatch.setattr("tbcad.light.simulate.parallel.THREADS", 1)
-    assert np.array_equal(synthesise(tiles, view, "blend").colour, before)
+    assert np.array_equal(synthesise(tiles, view, depth).colour, before)
     assert np.array_equal(refocus(tiles, view, focus).colour, mean)
 
 
@@ -119,10 +119,12 @@ def test_horizon_search_radius_is_the_distance_of_a_ray_below_the_nearest_mirror
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 90.0])
-def test_views_from_the_horizon_have_no_holes(tiles: MirrorTiles, azimuth: float) -> None:
+def test_views_from_the_horizon_have_no_holes(
+    tiles: MirrorTiles, knot: Scene, azimuth: float
+) -> None:
     """Half of their rays come from below all mirrors: the nearest captured ones stand in."""
-    for method in ("nearest", "blend"):
-        assert synthesise(tiles, view_from(azimuth, 0), method).seen.all()
+    for depth in (None, depth_along_rays(knot)):
+        assert synthesise(tiles, view_from(azimuth, 0), depth).seen.all()
 
 
 def test_refocus_is_a_lens(tiles: MirrorTiles, knot: Scene) -> None:
