@@ -185,14 +185,23 @@ def _without_case(folder: Path, file: Path) -> Path | None:
     return next((p for p in here if p.name.casefold() == file.name.casefold()), None)
 
 
-def texture_beside(mesh: Path, name: str, notes: list[str]) -> Bytes | None:
-    """A picture that a mesh names, as bytes (h, w, 3); None, and a note, where it is not there."""
+def textured(
+    mesh: Path, part: ObjectPart, uv: Floats | None, name: str, notes: list[str]
+) -> ObjectPart:
+    """A part with the picture that its mesh names; as it is, and a note, where that is not shown."""
+    if uv is None:
+        notes.append(f"it names the texture {name}, but has no texture coordinates")
+        return part
     try:
         file = file_beside(mesh, name)
     except InputError as error:
         notes.append(f"its texture {error}")
-        return None
-    return texture(file.read_bytes(), file.name, notes)
+        return part
+    picture = texture(file.read_bytes(), file.name, notes)
+    if picture is None:
+        return part
+    source = f"texture {PureWindowsPath(name).name}"
+    return replace(part, uv=uv, picture=picture, colours=None, source=source)
 
 
 def texture(data: bytes, name: str, notes: list[str]) -> Bytes | None:

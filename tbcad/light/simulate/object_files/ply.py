@@ -13,7 +13,7 @@ from tbcad.light.simulate.object_files.contents import (
     ObjectFile,
     ObjectPart,
     shown_shares,
-    texture_beside,
+    textured,
     triangles,
     without_facets,
 )
@@ -229,21 +229,17 @@ def _textured(
     notes: list[str],
 ) -> list[ObjectPart]:  # fmt: skip
     """The mesh by its textures; colours stay where there is none."""
-    if uv is None or not textures:
+    if not textures:
         if uv is not None:
             notes.append("it has texture coordinates, but names no texture (comment TextureFile)")
-        elif textures:
-            notes.append(f"it names the texture {textures[0]}, but has no texture coordinates")
         return [whole]
+    if uv is None:
+        return [textured(path, whole, uv, textures[0], notes)]
     parts = []
     for k in np.unique(number).tolist():
         own = number == k
         name = textures[k] if 0 <= k < len(textures) else textures[0]
-        picture = texture_beside(path, name, notes)
         colours = None if whole.colours is None else whole.colours[own]
         part = replace(whole, faces=whole.faces[own], colours=colours)
-        if picture is not None:
-            part = replace(part, colours=None, uv=uv[own], picture=picture,
-                           source=f"texture {Path(name).name}")  # fmt: skip
-        parts.append(part)
+        parts.append(textured(path, part, uv[own], name, notes))
     return parts
