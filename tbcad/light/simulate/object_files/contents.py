@@ -188,7 +188,7 @@ def _without_case(folder: Path, file: Path) -> Path | None:
 def textured(
     mesh: Path, part: ObjectPart, uv: Floats | None, name: str, notes: list[str]
 ) -> ObjectPart:
-    """A part with the picture that its mesh names; as it is, and a note, where that is not shown."""
+    """A part with the picture that its mesh names; as it is, and a note, where that is lost."""
     if uv is None:
         notes.append(f"it names the texture {name}, but has no texture coordinates")
         return part

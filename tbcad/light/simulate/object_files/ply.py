@@ -1,6 +1,7 @@
-"""PLY files (G. Turk, The PLY Polygon File Format, 1994), text and binary, with their colours."""
+"""PLY files (G. Turk, The PLY Polygon File Format, 1994), text and binary; OFF files as tables."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -13,6 +14,7 @@ from tbcad.light.simulate.object_files.contents import (
     ObjectFile,
     ObjectPart,
     shown_shares,
+    text_of,
     textured,
     triangles,
     without_facets,
@@ -24,14 +26,16 @@ TYPES = {
     "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
     "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
 }  # fmt: skip
+OFF = re.compile(r"(ST)?(C)?(N)?OFF\b")
 ENCODINGS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 MOST_ENTRIES = 1 << 20  # of a list
 Values: TypeAlias = NDArray[Any]
 COLOURS = (("red", "green", "blue"), ("r", "g", "b"),
            ("diffuse_red", "diffuse_green", "diffuse_blue"))  # fmt: skip
 COORDINATES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"))
+NORMALS = ("nx", "ny", "nz")
 CORNERS = ("vertex_indices", "vertex_index")
-KNOWN = {*"xyz", "nx", "ny", "nz", "alpha", "a", "diffuse_alpha", "texcoord", "texnumber", "flags",
+KNOWN = {*"xyz", *NORMALS, "alpha", "a", "diffuse_alpha", "texcoord", "texnumber", "flags",
          "quality", "confidence", *CORNERS, *sum(COLOURS, ()), *sum(COORDINATES, ())}  # fmt: skip
 
 
@@ -166,6 +170,53 @@ def _joined(parts: list[Any]) -> Values | List:
 def read_ply(path: Path) -> ObjectFile:
     """Read a mesh; InputError: it is no PLY file, cut off, or without facets."""
     tables, textures = read_tables(path.read_bytes())
+    return _mesh(path, tables, textures, [])
+
+
+def read_off(path: Path) -> ObjectFile:
+    """Read a mesh; InputError: it is no OFF file of text in three dimensions, or cut off."""
+    text = text_of(path.read_bytes())
+    lines = [line.partition("#")[0].strip() for line in text.splitlines()]
+    lines = [line for line in lines if line]
+    match = OFF.match(lines[0]) if lines else None
+    if match is None or "BINARY" in lines[0]:
+        raise InputError("its first line is not OFF, COFF, NOFF, STOFF: write it as text")
+    rest = lines[0][match.end() :].strip()
+    lines = [rest, *lines[1:]] if rest else lines[1:]
+    points, facets = (int(number) for number in lines[0].split()[:2])
+    rows = [line.split() for line in lines[1 : 1 + points + facets]]
+    if len(rows) < points + facets:
+        raise InputError("it is cut off: copy it again")
+    vertices, polygons = rows[:points], rows[points:]
+    names = [*"xyz", *NORMALS] if match[3] else [*"xyz"]
+    vertex, notes = _columns(vertices, names), list[str]()
+    counts = [int(row[0]) for row in polygons]
+    index = [int(n) for row, k in zip(polygons, counts, strict=True) for n in row[1 : 1 + k]]
+    face: Table = {CORNERS[0]: List(np.array(counts), np.array(index))}
+    own = [row[1 + k :] for row, k in zip(polygons, counts, strict=True)]
+    widths = {len(row) for row in own}
+    if match[2]:
+        vertex |= _columns([row[len(names) :] for row in vertices], COLOURS[0])
+    elif widths <= {3, 4}:
+        face |= _columns(own, (*COLOURS[0], *["alpha"] * (widths == {4})))
+    elif widths != {0}:
+        notes.append("colours of some of its faces only, or by a colour map, are left out")
+    return _mesh(path, {"vertex": vertex, "face": face}, [], notes)
+
+
+def _columns(rows: list[list[str]], names: Sequence[str]) -> Table:
+    """The first columns of text: whole numbers if none has a point, else real ones."""
+    cells = [row[: len(names)] for row in rows]
+    if any(len(row) < len(names) for row in cells):
+        raise InputError(f"one of its lines has fewer numbers than {' '.join(names)}")
+    values = np.array(cells, dtype=np.float64).reshape(-1, len(names))
+    real = any("." in number for row in cells for number in row) or (values % 1 != 0).any()
+    return dict(zip(names, values.astype(np.float64 if real else np.int64).T, strict=True))
+
+
+def _mesh(
+    path: Path, tables: dict[str, Table], textures: list[str], notes: list[str]
+) -> ObjectFile:
     vertex, face = tables.get("vertex", {}), tables.get("face", {})
     if not {*"xyz"} <= vertex.keys():
         raise InputError("its vertices have no x, y, z")
@@ -174,12 +225,11 @@ def read_ply(path: Path) -> ObjectFile:
     if corners is None or len(corners.counts) == 0:
         raise without_facets(len(points))
     index = corners.values.astype(np.int64)
-    if len(index) and not (index.min() >= 0 and index.max() < len(points)):
+    if len(index) != corners.counts.sum() or ((index < 0) | (index >= len(points))).any():
         raise InputError("its facets name corners that do not exist: it is damaged")
     cut, polygon = triangles(corners.counts, points[index])
     faces = index[cut]
-    notes = list[str]()
-    normals = _stack(vertex, ("nx", "ny", "nz")) if "nz" in vertex else None
+    normals = _stack(vertex, NORMALS) if "nz" in vertex else None
     colours, source = _colours(vertex, face, faces, polygon, notes)
     uv = _coordinates(vertex, face, corners.counts, cut, faces)
     whole = ObjectPart(points, faces, normals, colours, source=source)
