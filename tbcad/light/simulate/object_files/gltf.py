@@ -24,7 +24,8 @@ from tbcad.light.simulate.object_files.gltf_meshes import (
 )
 from tbcad.types import Floats
 
-MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", 0x4E4F534A, 0x004E4942
+MAGIC = b"glTF"
+JSON_START = 20  # behind the header of the file and that of its first chunk
 MOST_NODES = 100_000
 READ = {DRACO, TRANSFORM, WEBP, "KHR_mesh_quantization"}
 ONLY_LOOKS = "KHR_materials_"  # gloss, glass, cloth ...: of the surface, not of its colour
@@ -48,12 +49,12 @@ def read_gltf(path: Path) -> ObjectFile:
             how = REMEDY.get(name, "another exporter")
             raise InputError(f"it needs {name}, which is not read: write it without, as by {how}")
     file = GltfFile(path, document, _buffers(path, document, binary))
-    parts = []
-    for mesh, matrix in _placed_meshes(document):
-        for primitive in document["meshes"][mesh]["primitives"]:
-            part = primitive_part(file, primitive)
-            if part is not None:
-                parts.append(part.moved(matrix))
+    parts = [
+        part.moved(matrix)
+        for mesh, matrix in _placed_meshes(document)
+        for primitive in document["meshes"][mesh]["primitives"]
+        if (part := primitive_part(file, primitive)) is not None
+    ]
     if not parts:
         raise without_facets(0)
     primitives = (p for mesh in document["meshes"] for p in mesh["primitives"])
@@ -71,15 +72,10 @@ def _document(path: Path) -> tuple[Json, bytes]:
     """The JSON, and the binary chunk of a .glb."""
     data, binary = path.read_bytes(), b""
     if data.startswith(MAGIC):
-        if len(data) < 20 or int.from_bytes(data[8:12], "little") > len(data):
+        if len(data) < JSON_START or int.from_bytes(data[8:12], "little") > len(data):
             raise InputError("it is cut off: copy it again")
-        chunks = dict[int, bytes]()
-        at = 12
-        while at + 8 <= len(data):
-            size, kind = (int.from_bytes(data[at + k : at + k + 4], "little") for k in (0, 4))
-            chunks.setdefault(kind, data[at + 8 : at + 8 + size])
-            at += 8 + size
-        data, binary = chunks.get(JSON_CHUNK, b""), chunks.get(BINARY_CHUNK, b"")
+        end = JSON_START + int.from_bytes(data[12:16], "little")
+        data, binary = data[JSON_START:end], data[end + 8 :]
     try:
         document = json.loads(data.decode("utf-8-sig"))
     except ValueError:
@@ -90,13 +86,10 @@ def _document(path: Path) -> tuple[Json, bytes]:
 
 
 def _buffers(path: Path, document: Json, binary: bytes) -> list[bytes]:
-    found = []
-    for buffer in document.get("buffers", []):
-        uri = buffer.get("uri")
-        data = binary if uri is None else uri_bytes(path, uri)
-        if len(data) < buffer["byteLength"]:
-            raise InputError(CUT_OFF)
-        found.append(data)
+    buffers = document.get("buffers", [])
+    found = [uri_bytes(path, one["uri"]) if "uri" in one else binary for one in buffers]
+    if any(len(data) < one["byteLength"] for data, one in zip(found, buffers, strict=True)):
+        raise InputError(CUT_OFF)
     return found
 
 

@@ -111,14 +111,11 @@ def primitive_part(file: GltfFile, primitive: Json) -> ObjectPart | None:
 def _faces(index: Ints, mode: int) -> Ints:
     if mode == TRIANGLES:
         return index[: len(index) // 3 * 3].reshape(-1, 3)
-    if len(index) < 3:
-        return np.zeros((0, 3), dtype=np.int64)
-    if mode == FAN:
-        first = np.broadcast_to(index[0], len(index) - 2)
-        return np.column_stack([first, index[1:-1], index[2:]])
-    faces = np.column_stack([index[:-2], index[1:-1], index[2:]])
-    faces[1::2] = faces[1::2, ::-1]
-    return faces
+    begin = np.arange(max(len(index) - 2, 0))
+    corners = np.column_stack([0 * begin if mode == FAN else begin, begin + 1, begin + 2])
+    if mode != FAN:  # of a strip each second facet is turned
+        corners[1::2] = corners[1::2, ::-1]
+    return index[corners]
 
 
 def _unpacked(file: GltfFile, extension: Json) -> tuple[dict[str, Floats], Ints | None]:
@@ -150,19 +147,20 @@ def _coloured(
     if corner is not None and corner.shape[1] > 3 and (corner[:, 3] < 1).any():
         file.notes.append("its transparency is left out")
     picture = None if reference is None else _picture(file, reference, factor[:3])
-    if picture is not None and reference is not None:
+    if reference is not None and picture is not None:
         uv = _coordinates(file, reference, attributes, part)
         if uv is not None:
             shares = None if corner is None else srgb(corner[:, :3].clip(0, 1))[part.faces]
-            name = _source(file, reference)[1]
-            return replace(part, uv=uv, picture=picture, colours=shares, source=f"texture {name}")
+            source = f"texture {_source(file, reference)[1]}"
+            return replace(part, uv=uv, picture=picture, colours=shares, source=source)
     if corner is not None:
-        shares = srgb((corner[:, :3] * factor[:3]).clip(0, 1))[part.faces]
-        return replace(part, colours=shares, source="vertex colours")
-    if number is None:
+        shares, source = srgb((corner[:, :3] * factor[:3]).clip(0, 1))[part.faces], "vertex colours"
+    elif number is not None:
+        shares = even(srgb(factor[:3].clip(0, 1)), len(part.faces))
+        source = "colours of materials (baseColorFactor)"
+    else:
         return part
-    shares = even(srgb(factor[:3].clip(0, 1)), len(part.faces))
-    return replace(part, colours=shares, source="colours of materials (baseColorFactor)")
+    return replace(part, colours=shares, source=source)
 
 
 def _base(material: Json) -> tuple[Floats, Json | None]:
@@ -234,12 +232,10 @@ def _coordinates(
         file.notes.append("it names a texture, but has no texture coordinates")
         return None
     turn = float(transform.get("rotation", 0.0))
+    cosine, sine = np.cos(turn), np.sin(turn)
     scaled = given * np.array(transform.get("scale", (1, 1)), dtype=np.float64)
-    turned = np.column_stack([
-        np.cos(turn) * scaled[:, 0] + np.sin(turn) * scaled[:, 1],
-        np.cos(turn) * scaled[:, 1] - np.sin(turn) * scaled[:, 0],
-    ])  # fmt: skip
-    uv = turned + np.array(transform.get("offset", (0, 0)), dtype=np.float64)
+    uv = scaled @ np.array([[cosine, -sine], [sine, cosine]])
+    uv += np.array(transform.get("offset", (0, 0)), dtype=np.float64)
     sampler = file.document["textures"][reference["index"]].get("sampler")
     if sampler is not None and not ((uv >= -FULL_UV) & (uv <= 1 + FULL_UV)).all():
         modes = file.document["samplers"][sampler]
