@@ -175,19 +175,9 @@ def _truths(
         return None, None
     if relit is not None and wanted is not None:
         return _lit_truths(scene, at, relit, wanted)
-    return true_picture(*(_turned(scene, at, *turned) if turned else (scene, at))), None
+    from tbcad.light.simulate.capture.sequence import turned_frame
 
-
-def _turned(scene: "Scene", at: "Camera", folder: Path, number: int) -> tuple["Scene", "Camera"]:
-    """Object and camera as they are to each other in a frame."""
-    from tbcad.light.simulate.capture.sequence import (
-        camera_before_turn,
-        lit_when_turned,
-        turn_of_frame,
-    )
-
-    angle = turn_of_frame(folder, number)
-    return lit_when_turned(scene, angle), camera_before_turn(at, angle)
+    return true_picture(*(turned_frame(*turned, scene, at) if turned else (scene, at))), None
 
 
 def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit":

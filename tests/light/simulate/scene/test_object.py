@@ -126,6 +126,8 @@ def test_damaged_objects(tmp_path: Path) -> None:
     strange = {
         "faces": arrays["faces"] + len(arrays["points"]),
         "normals": arrays["normals"][:-1],
+        "light": arrays["points"][:, 0],
+        "uv": np.zeros((len(arrays["faces"]), 3, 2)),
         "points": np.array([{}], dtype=object),
     }
     for name in (*strange, "cut"):
@@ -302,26 +304,3 @@ def test_facets_without_colours_beside_others_are_noted(tmp_path: Path) -> None:
     )
     with pytest.warns(PlausibilityWarning, match="1 of its 2 facets have no colour"):
         load_object(tmp_path / "a.obj", CAPTURE_MM)
-
-
-def test_objects_of_older_captures_are_read(tmp_path: Path) -> None:
-    """Their one texture was not multiplied, and light was of one side."""
-    arrays = {
-        "name": "old", "points": np.eye(3), "faces": [[0, 1, 2]], "normals": np.eye(3),
-        "albedo": np.full((1, 3, 3), 0.8), "uv": np.zeros((1, 3, 2)),
-        "texture": np.full((2, 4, 3), 51, dtype=np.uint8), "patterned": False,
-        "light": np.array([0.5, 0.6, 0.7]),
-    }  # fmt: skip
-    np.savez(tmp_path / "object.npz", **arrays)
-    subject = read_object(tmp_path)
-    assert subject.light is not None
-    assert subject.light.tolist() == [[0.5, 0.5], [0.6, 0.6], [0.7, 0.7]]
-    inward = -unit(np.ones((1, 3)))
-    hits = surface_hits(prepared_scene(subject), -5 * inward, inward)
-    assert hits.albedo(subject)[0] == pytest.approx([0.2] * 3)
-
-
-def test_options_out_of_their_range() -> None:
-    for wrong in ({"unit": "furlong"}, {"up": "x"}, {"paint": "blue"}):
-        with pytest.raises(InputError, match="is not known: allowed is"):
-            ObjectOptions(**wrong)  # type: ignore[arg-type]
