@@ -28,6 +28,7 @@ TYPES = {
 }  # fmt: skip
 OFF = re.compile(r"(ST)?(C)?(N)?OFF\b")
 ENCODINGS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+CUT_OFF = "it is cut off: copy it again"
 MOST_ENTRIES = 1 << 20  # of a list
 Values: TypeAlias = NDArray[Any]
 COLOURS = (("red", "green", "blue"), ("r", "g", "b"),
@@ -59,21 +60,6 @@ class List(NamedTuple):
 
 
 Table = dict[str, Any]  # columns by name: Values or List
-
-
-def read_tables(data: bytes) -> tuple[dict[str, Table], list[str]]:
-    """Tables by the name of their element, and the names of textures in comments.
-
-    InputError: it is no PLY file, or cut off.
-    """
-    encoding, elements, textures, at = _header(data)
-    order = ENCODINGS[encoding]
-    if encoding == "ascii":  # as if all of its numbers were stored as real ones
-        data, at = np.array(data[at:].split(), dtype=np.float64).tobytes(), 0
-    tables = dict[str, Table]()
-    for one in elements:
-        tables[one.name], at = _table(one, data, at, order)
-    return tables, textures
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], list[str], int]:
@@ -110,66 +96,69 @@ def _table(one: _Element, data: bytes, at: int, order: str) -> tuple[Table, int]
 
     At once where all its lists are as long as those of the first row, else row by row.
     """
-    if one.length == 0:
-        none = List(np.zeros(0, dtype=np.int64), np.zeros(0))
-        return {name: none if length else none.values for name, _, length in one.properties}, at
+    parts = list[Values]()
     try:
-        found, end = _rows(one, one.length, data, at, order)
-        lists = (column for column in found.values() if isinstance(column, List))
-        if all((column.counts == column.counts[0]).all() for column in lists):
-            return found, end
+        parts = [_rows(one, one.length, data, at, order)] if one.length else []
+        lists = [
+            part[_count(name)] for part in parts for name, _, length in one.properties if length
+        ]
+        alike = all((counts == counts[0]).all() for counts in lists)
     except InputError:
-        pass  # where lists differ in length, the first says nothing of the others
-    parts = []
-    for _ in range(one.length):
-        part, at = _rows(one, 1, data, at, order)
-        parts.append(part)
-    return {name: _joined([part[name] for part in parts]) for name, _, _ in one.properties}, at
+        alike = False  # where lists differ in length, the first says nothing of the others
+    if not alike:
+        parts, end = [], at
+        for _ in range(one.length):
+            parts.append(_rows(one, 1, data, end, order))
+            end += parts[-1].nbytes
+    table = Table()
+    for name, kind, length in one.properties:
+        values = [part[name].astype(kind).ravel() for part in parts]
+        table[name] = np.concatenate([np.zeros(0, dtype=kind), *values])
+        if length:
+            counts = [part[_count(name)].astype(np.int64) for part in parts]
+            table[name] = List(np.concatenate([np.zeros(0, dtype=np.int64), *counts]), table[name])
+    return table, at + sum(part.nbytes for part in parts)
 
 
-def _rows(one: _Element, count: int, data: bytes, at: int, order: str) -> tuple[Table, int]:
-    """Columns of rows that are all as the first, and where they end."""
+def _rows(one: _Element, count: int, data: bytes, at: int, order: str) -> Values:
+    """Rows that are all as the first, as fields by name; InputError: there are not so many."""
     fields = list[Any]()
-    for k, (name, kind, length) in enumerate(one.properties):
+    for name, kind, length in one.properties:
         if length is None:
-            fields.append((f"{k}", _stored(kind, order)))
+            fields.append((name, _stored(kind, order)))
             continue
-        size = _first(data, at + np.dtype(fields).itemsize, _stored(length, order))
+        place, stored = at + np.dtype(fields).itemsize, np.dtype(_stored(length, order))
+        if place + stored.itemsize > len(data):
+            raise InputError(CUT_OFF)
+        size = int(np.frombuffer(data, stored, 1, place)[0])
         if not 0 <= size <= MOST_ENTRIES:
             raise InputError(f"its list {name} has {size} entries: it is damaged")
-        fields += [(f"{k}n", _stored(length, order)), (f"{k}", _stored(kind, order), (size,))]
+        fields += [(_count(name), stored), (name, _stored(kind, order), (size,))]
     row = np.dtype(fields)
-    end = at + count * row.itemsize
-    if end > len(data):
-        raise InputError("it is cut off: copy it again")
-    table, columns = np.frombuffer(data, row, count, at), Table()
-    for k, (name, kind, length) in enumerate(one.properties):
-        values = table[f"{k}"].astype(kind)
-        columns[name] = List(table[f"{k}n"].astype(np.int64), values.ravel()) if length else values
-    return columns, end
+    if at + count * row.itemsize > len(data):
+        raise InputError(CUT_OFF)
+    return np.frombuffer(data, row, count, at)
+
+
+def _count(name: str) -> str:
+    """The field of the length of a list."""
+    return f"number of {name}"
 
 
 def _stored(kind: str, order: str) -> str:
     return order + kind if order else "f8"
 
 
-def _first(data: bytes, at: int, kind: str) -> int:
-    """The number at a place."""
-    try:
-        return int(np.frombuffer(data, kind, 1, at)[0])
-    except ValueError:
-        raise InputError("it is cut off: copy it again") from None
-
-
-def _joined(parts: list[Any]) -> Values | List:
-    if not isinstance(parts[0], List):
-        return np.concatenate(parts)
-    return List(*(np.concatenate([part[k] for part in parts]) for k in range(2)))
-
-
 def read_ply(path: Path) -> ObjectFile:
     """Read a mesh; InputError: it is no PLY file, cut off, or without facets."""
-    tables, textures = read_tables(path.read_bytes())
+    data = path.read_bytes()
+    encoding, elements, textures, at = _header(data)
+    order = ENCODINGS[encoding]
+    if encoding == "ascii":  # as if all of its numbers were stored as real ones
+        data, at = np.array(data[at:].split(), dtype=np.float64).tobytes(), 0
+    tables = dict[str, Table]()
+    for one in elements:
+        tables[one.name], at = _table(one, data, at, order)
     return _mesh(path, tables, textures, [])
 
 
@@ -186,7 +175,7 @@ def read_off(path: Path) -> ObjectFile:
     points, facets = (int(number) for number in lines[0].split()[:2])
     rows = [line.split() for line in lines[1 : 1 + points + facets]]
     if len(rows) < points + facets:
-        raise InputError("it is cut off: copy it again")
+        raise InputError(CUT_OFF)
     vertices, polygons = rows[:points], rows[points:]
     names = [*"xyz", *NORMALS] if match[3] else [*"xyz"]
     vertex, notes = _columns(vertices, names), list[str]()
