@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tbcad.cad.formats.pictures import picture_of
 from tbcad.cad.formats.pixels import Picture
 from tbcad.common.figure_files import srgb
+from tbcad.core.geometry.vectors import facet_vectors
 from tbcad.errors import InputError
 from tbcad.types import Bytes, Floats, Ints
 
@@ -127,7 +128,7 @@ def _not_convex(counts: Ints, polygon: Ints, corners: Floats) -> list[int]:
     """Polygons of which a triangle of the fan is turned against the whole."""
     if len(polygon) == len(counts):
         return []
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    across = facet_vectors(corners)
     whole = np.zeros((len(counts), 3))
     np.add.at(whole, polygon, across)
     turned = np.einsum("tx,tx->t", across, whole[polygon]) < 0

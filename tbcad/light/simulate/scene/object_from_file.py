@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tbcad.core.geometry.round_cones import smallest_sphere
-from tbcad.core.geometry.vectors import norm
+from tbcad.core.geometry.vectors import facet_vectors, norm
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.light.simulate.object_files.contents import (
     UNITS_MM,
@@ -22,7 +22,6 @@ from tbcad.light.simulate.object_files.contents import (
 )
 from tbcad.light.simulate.object_files.normals import (
     corner_normals,
-    facet_vectors,
     first_of_each,
     turned_outward,
     usable,
@@ -177,7 +176,7 @@ def _shown(path: Path, points: Floats, faces: Ints) -> Ints:
     if np.ptp(corners.reshape(-1, 3), axis=0).max() == 0:
         raise InputError(f"{path} has no extent: all its points are one: name another")
     longest = norm(corners - np.roll(corners, 1, axis=1)).max(axis=1)
-    shown = np.flatnonzero(norm(facet_vectors(points, faces)) > LEAST_AREA * longest**2)
+    shown = np.flatnonzero(norm(facet_vectors(corners)) > LEAST_AREA * longest**2)
     if len(shown) == 0:
         raise InputError(f"{path} has no area: all its facets are lines or points: name another")
     return shown[first_of_each(faces[shown])]
