@@ -194,7 +194,7 @@ def virtual_camera_pixels(array: MirrorArray, spec: Spec) -> tuple[Floats, Ints]
     The two halves of a mirror on the seam make one virtual camera, with the pixels of both.
     """
     sensor = Sensor(spec.camera.width_px, spec.camera.height_px)
-    counts = count_pixels(array, (sensor,), spec.optics.capture_diameter_mm / 2)[0]
+    counts = count_pixels(array, sensor, spec.optics.capture_diameter_mm / 2)
     halved = array.u[:, 0] == 0
     return np.where(halved, 2, 1) * counts.seen, np.where(halved, 1, 2)
 

@@ -117,7 +117,7 @@ def pixels_of_cameras(array: MirrorArray, radius: float) -> Floats:
     """
     camera = array.camera
     sensor = Sensor(camera.width_px, camera.height_px)
-    seen = count_pixels(array, (sensor,), radius)[0].seen
+    seen = count_pixels(array, sensor, radius).seen
     halved = array.u[:, 0] == 0
     return np.concatenate([np.where(halved, 2 * seen, seen), seen[~halved]])
 
