@@ -184,8 +184,8 @@ def count_pixels(
     sampled = replace(full, width_px=width, height_px=height)
     reflector = Reflector(array.camera_id, sampled, array.u, array.cells)
     scale = (sensor.width_px / width) ** 2
-    counts = (scale * one for one in traced_pixels(reflector, array.theta0, radius))
-    return PixelCounts(*counts, full.fill(corners), width * height)
+    on, seen, disc = (scale * one for one in traced_pixels(reflector, array.theta0, radius))
+    return PixelCounts(on, seen, disc, full.fill(corners), width * height)
 
 
 def traced_pixels(

@@ -78,18 +78,12 @@ def _reflected(
     return BallHits(ball, origin, reflected, distance)
 
 
-def reflected_colours(scene: Scene, hits: BallHits) -> Colours:
-    """Colours (n, 3) of the object's images in the balls, 0 to 255."""
-    colour = np.zeros((len(hits.ball), 3), dtype=np.float32)
-    on = np.flatnonzero(hits.ball)
-    colour[on] = cast_rays(scene, hits.origin[on], hits.direction[on]).colour
-    return colour
-
-
 def camera_colours(scene: Scene, pinhole: Floats, direction: Floats, hits: BallHits) -> Colours:
     """What a camera records along unit directions (n, 3) that meet balls, 0 to 255."""
+    colour, on = np.zeros((len(hits.ball), 3), dtype=np.float32), np.flatnonzero(hits.ball)
+    colour[on] = cast_rays(scene, hits.origin[on], hits.direction[on]).colour
     front, direct = object_in_front(scene, pinhole, direction, hits.distance)
-    return np.where(front[:, None], direct, reflected_colours(scene, hits))
+    return np.where(front[:, None], direct, colour)
 
 
 def image_points(camera: LensCamera, direction: Floats) -> Floats:
