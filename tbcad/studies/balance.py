@@ -104,7 +104,7 @@ def _of_n(
 def _counts(design: MirrorDesign) -> Record:
     array, camera = design.arrays[0], design.spec.camera
     sensor = Sensor(camera.width_px, camera.height_px)
-    counts = count_pixels(array, (sensor,), design.spec.optics.capture_diameter_mm / 2)[0]
+    counts = count_pixels(array, sensor, design.spec.optics.capture_diameter_mm / 2)
     number = virtual_cameras(array)
     return {"virtual_cameras": number, "pixels": float(2 * counts.seen.sum() / number)}
 

@@ -97,7 +97,7 @@ def _pixel_records(spec: Spec, pitch: float, row: BalancedSensor, radii: str) ->
         return [_record(row, "no design", radii, None, attempt.reason)]
     sensor = Sensor(row.width_px, row.height_px)
     radius = spec.optics.capture_diameter_mm / 2
-    counts = count_pixels(attempt.array, (sensor,), radius)[0]
+    counts = count_pixels(attempt.array, sensor, radius)
     cameras, values = virtual_cameras(attempt.array), dict[str, float]()
     kinds = {"seeing": counts.seen, "disc": counts.disc, "on mirrors": counts.on}
     for name, pixels in kinds.items():
@@ -107,7 +107,7 @@ def _pixel_records(spec: Spec, pitch: float, row: BalancedSensor, radii: str) ->
     whole = 2 * sensor.width_px * sensor.height_px
     values["pixels of both frames / virtual cameras"] = whole / cameras
     if radii == PITCHED_RADII:
-        turned = count_pixels(attempt.array, (sensor,), radius, axes=axes_at_pitch(pitch))[0]
+        turned = count_pixels(attempt.array, sensor, radius, axes=axes_at_pitch(pitch))
         values[f"{DISC}, {_at(pitch)}"] = float(turned.disc.mean())
     return [_record(row, name, radii, value) for name, value in values.items()]
 

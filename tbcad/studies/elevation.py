@@ -126,7 +126,7 @@ def elevation(spec: Spec, progress: Progress = lambda _: None) -> Study:
     progress("pixels")
     traced = arrays["traced"]
     sensor = Sensor(spec.camera.width_px, spec.camera.height_px)
-    counts = count_pixels(traced, (sensor,), spec.optics.capture_diameter_mm / 2)[0]
+    counts = count_pixels(traced, sensor, spec.optics.capture_diameter_mm / 2)
     mirrors = _mirrors(traced, arrays["paper"], counts, spec.mirrors.max_radius_widths)
     correlations = [
         record for rule, array in arrays.items() for record in _correlations(rule, array)

@@ -132,9 +132,9 @@ def _counts(spec: Spec, sensors: tuple[Sensor, ...], n: int) -> list[Record]:
     if attempt.array is None:
         return [{**head, **dict.fromkeys(COUNTED), "reason": attempt.reason} for head in heads]
     cameras = virtual_cameras(attempt.array)
-    counts = count_pixels(attempt.array, sensors, radius)
     rows: list[Record] = []
-    for head, one in zip(heads, counts, strict=True):
+    for head, sensor in zip(heads, sensors, strict=True):
+        one = count_pixels(attempt.array, sensor, radius)
         # Both cameras' pictures are mirror images, pixel by pixel.
         seeing, on = 2 * float(one.seen.sum()), 2 * float(one.on.sum())
         figures = (cameras, seeing, on, seeing / cameras, on / cameras, one.fill, one.rays)

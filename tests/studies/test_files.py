@@ -224,7 +224,7 @@ def window(at: Reflector, mirror: int) -> float:
 def test_pixels_on_mirrors_are_the_areas_of_their_cells(wide: MirrorDesign) -> None:
     """Pixels counted one by one against the area within the cell's arcs."""
     at = reflectors(wide)[0]
-    on = count_pixels(wide.arrays[0], (Sensor(832, 620),), 30.0)[0].on
+    on = count_pixels(wide.arrays[0], Sensor(832, 620), 30.0).on
     area = np.array([window(at, i) for i in range(len(at))])
     assert np.abs(on - area).max() < 3 * np.sqrt(area.max())  # pixels along its edge
     assert on.sum() == pytest.approx(area.sum(), rel=5e-4)
@@ -238,10 +238,10 @@ def test_both_cameras_have_the_same_pixels(wide: MirrorDesign) -> None:
 
 def test_no_ray_meets_nothing_and_all_meet_everything(wide: MirrorDesign) -> None:
     array = wide.arrays[0]
-    sensor = (Sensor(416, 310),)
-    assert count_pixels(array, sensor, 0.0)[0].seen.sum() == 0
-    most = count_pixels(array, sensor, 300.0)[0]  # all mirrors are inside
-    some = count_pixels(array, sensor, 30.0)[0]
+    sensor = Sensor(416, 310)
+    assert count_pixels(array, sensor, 0.0).seen.sum() == 0
+    most = count_pixels(array, sensor, 300.0)  # all mirrors are inside
+    some = count_pixels(array, sensor, 30.0)
     assert (some.seen <= some.on).all()
     assert 0.3 < some.seen.sum() / some.on.sum() < 0.9
     assert np.array_equal(some.on, most.on)
@@ -254,8 +254,8 @@ def test_rays_for_blocks_of_pixels_give_the_same_count(
 ) -> None:
     """Also where sides do not divide."""
     array, sensor = wide.arrays[0], Sensor(*size)
-    every = count_pixels(array, (sensor,), 30.0)[0]
-    some = count_pixels(array, (sensor,), 30.0, most_rays=600_000)[0]
+    every = count_pixels(array, sensor, 30.0)
+    some = count_pixels(array, sensor, 30.0, most_rays=600_000)
     assert (every.rays, some.rays) == (size[0] * size[1], 832 * 620)
     assert some.on.sum() == pytest.approx(every.on.sum(), rel=5e-4)
     assert some.seen.sum() == pytest.approx(every.seen.sum(), rel=5e-4)

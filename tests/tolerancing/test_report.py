@@ -106,7 +106,7 @@ class TestWords:
         spread = report_dict(analysis)["ray_spread_mm"]
         assert 0 < spread["median"] <= spread["largest"]
         array, sensor = little.arrays[0], Sensor(little.spec.camera.width_px, 1552)
-        on = count_pixels(array, (sensor,), TARGET / 2)[0].on
+        on = count_pixels(array, sensor, TARGET / 2).on
         halved = array.u[:, 0] == 0
         pixels = np.concatenate([np.where(halved, 2 * on, on), on[~halved]])
         area = np.median(pixels) * spread["pixel_width_median"] ** 2

@@ -33,6 +33,12 @@ def unit(v: Floats) -> Floats:
     return result
 
 
+def facet_vectors(corners: Floats) -> Floats:
+    """Normals (..., 3) of triangles with corners (..., 3, 3), twice as long as their areas."""
+    a, b, c = (corners[..., k, :] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
 def perpendicular_axes(axis: Floats) -> Floats:
     """Two unit vectors (..., 2, 3) that are a right-handed frame with unit axes (..., 3)."""
     first = unit(np.cross(np.eye(3)[np.argmin(np.abs(axis), axis=-1)], axis))

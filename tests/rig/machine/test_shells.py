@@ -129,7 +129,7 @@ def test_a_merge_has_a_ray_for_each_pixel_of_a_mirror(pedestals: ExportedDesign,
     machine, plan = designed_half(pedestals, half), shell_plan(pedestals, half)
     run = machine_run(pedestals, plan, machine, (shell_frame(half),), half)
     merged = merge_plan(run, 30.0, lambda mirror, *_: np.zeros(len(mirror), dtype=bool))
-    mirror, hits, _, _ = merged_pixels(merged, range(310))
+    mirror, hits, _ = merged_pixels(merged, range(310))
     assert np.array_equal(hits.ball, mirror)
     assert np.array_equal(mirror, traced(pedestals.reflectors[half]))
     joined = replace(merged, run=replace(run, parted=False))

@@ -158,16 +158,13 @@ def _truths(
 ) -> tuple["Bytes | None", "Bytes | None"]:
     """The ray-traced pictures, and in the light of the same lamps, where they are known."""
     from tbcad.light.reflectance.transport import TRUE_LIGHTS, lit_scene
-    from tbcad.light.simulate.capture import sequence
 
     if scene is None:
         return None, None
     if relit is None or wanted is None:
-        if turned is not None:  # object and camera as they are to each other in the frame
-            angle = sequence.turn_of_frame(*turned)
-            scene = sequence.lit_when_turned(scene, angle)
-            at = sequence.camera_before_turn(at, angle)
-        return true_picture(scene, at), None
+        from tbcad.light.simulate.capture.sequence import turned_frame
+
+        return true_picture(*(turned_frame(*turned, scene, at) if turned else (scene, at))), None
 
     def lit_by(lights: "PointLights") -> "Bytes":
         return true_picture(lit_scene(scene, lights, relit.exposure), at, LIT_SAMPLES)

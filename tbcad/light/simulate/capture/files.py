@@ -28,6 +28,7 @@ RAYS_PER_CHUNK = {"u1": 1 << 16, "f2": 1 << 15}  # 192 kB
 COMPRESSION_LEVEL = 1  # higher ones save 2 % at most
 OBJECT, RECORD = "object.npz", "capture.json"
 SCHEMA = "tbcad-capture/1"
+TEXTURE = {"uv", "texture", "tiles"}  # arrays of an object that go together
 MAX_OBJECT_BYTES = 4 << 30  # bytes, unpacked
 
 
@@ -189,38 +190,26 @@ def read_object(folder: Path) -> SceneObject:
 
 
 def _subject(arrays: dict[str, Any]) -> SceneObject:
-    faces = arrays["faces"].astype(np.int64)
-    points, normals, albedo = (
-        arrays[name].astype(np.float64) for name in ("points", "normals", "albedo")
-    )
-    uv, texture = arrays.get("uv"), arrays.get("texture")
-    v, f = len(points), len(faces)
-    shapes = (points.shape, faces.shape, normals.shape, albedo.shape)
-    if shapes != ((v, 3), (f, 3), (v, 3), (f, 3, 3)) or f == 0:
-        raise ValueError("arrays do not belong together")
-    if faces.min() < 0 or faces.max() >= v or not np.isfinite(points).all():
+    points, facets = len(arrays["points"]), len(arrays["faces"])
+    shapes = {
+        "points": (points, 3), "faces": (facets, 3), "normals": (points, 3),
+        "albedo": (facets, 3, 3), "light": (points, 2), "uv": (facets, 3, 2), "tiles": (facets, 3),
+    }  # fmt: skip
+    for name in shapes.keys() & arrays.keys():
+        if arrays[name].shape != shapes[name] or not np.isfinite(arrays[name]).all():
+            raise ValueError(f"its {name} do not belong to its facets")
+    faces = arrays["faces"]
+    if not facets or faces.dtype != np.int64 or not 0 <= faces.min() <= faces.max() < points:
         raise ValueError("facets have corners that do not exist")
-    light, tiles = arrays.get("light"), arrays.get("tiles")
-    if light is not None and light.ndim == 1:  # of older captures: backs had the front's
-        light = np.column_stack([light, light])
-    if texture is not None and tiles is None:  # and the only texture was not multiplied
-        tiles, albedo = np.tile([0, *texture.shape[:2]], (f, 1)), np.ones_like(albedo)
-    if light is not None and (light.shape != (v, 2) or not np.isfinite(light).all()):
-        raise ValueError("light and corners do not belong together")
-    if (uv is None) != (texture is None) or (uv is not None and uv.shape != (f, 3, 2)):
-        raise ValueError("a texture without its coordinates")
-    if tiles is not None and not _are_within(tiles, texture, f):
+    textured = TEXTURE & arrays.keys()
+    if textured and (textured != TEXTURE or not _are_within(arrays["tiles"], arrays["texture"])):
         raise ValueError("a texture without its places")
-    name, patterned = str(arrays["name"]), bool(arrays["patterned"])
-    return SceneObject(name, points, faces, normals, albedo, uv, texture, tiles, patterned, light)
+    texts = {"name": str(arrays["name"]), "patterned": bool(arrays["patterned"])}
+    return SceneObject(**{**arrays, **texts})
 
 
-def _are_within(tiles: Ints, texture: Bytes | None, facets: int) -> bool:
+def _are_within(tiles: Ints, texture: Bytes) -> bool:
     """Whether pictures (f, 3), by first row, height and width, are on a texture."""
-    if texture is None or tiles.shape != (facets, 3) or tiles.min() < 0:
-        return False
-    used = tiles[tiles[:, 1] > 0]
-    return bool(
-        (used[:, 0] + used[:, 1] <= len(texture)).all()
-        and ((used[:, 2] > 0) & (used[:, 2] <= texture.shape[1])).all()
-    )
+    first, height, width = tiles[tiles[:, 1] > 0].T
+    rows, columns = texture.shape[:2]
+    return bool(((first >= 0) & (first + height <= rows) & (width > 0) & (width <= columns)).all())

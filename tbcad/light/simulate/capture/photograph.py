@@ -162,48 +162,30 @@ def allowed(width_px: int, height_px: int) -> bool:
 
 def count_pixels(
     array: MirrorArray,
-    sensors: tuple[Sensor, ...],
+    sensor: Sensor,
     radius: float,
     most_rays: int = MAX_RAYS,
     axes: tuple[Floats, Floats] | None = None,
-) -> list[PixelCounts]:
-    """Count the pixels of a camera with each sensor, the lens and mirrors as they are.
-
-    With each sensor in place of the design's the camera is turned so that the mirrors fit it best,
-    or has `axes`: forward and right, (3,) each. `radius`: of the capture sphere, mm. Sensors beyond
-    `most_rays` are sampled by one ray for each square block of pixels, so that sensors of one shape
-    may share their rays.
-    """
-    traced: dict[tuple[int, int, float], PixelCounts] = {}
-    counts = []
-    for sensor in sensors:
-        step = math.ceil(math.sqrt(sensor.width_px * sensor.height_px / most_rays))
-        width, height = -(-sensor.width_px // step), -(-sensor.height_px // step)
-        key = width, height, sensor.height_px / sensor.width_px
-        if key not in traced:
-            traced[key] = _counted(array, _view(array, sensor, axes), (width, height), radius)
-        one, scale = traced[key], (sensor.width_px / width) ** 2
-        counts.append(replace(one, on=one.on * scale, seen=one.seen * scale, disc=one.disc * scale))
-    return counts
-
-
-def _view(array: MirrorArray, sensor: Sensor, axes: tuple[Floats, Floats] | None) -> Camera:
-    camera, corners = array.camera, array.cells.corners
-    width, height = sensor.width_px, sensor.height_px
-    if axes is None:
-        return fitted_camera(camera.pinhole, corners, width, height, camera.hfov)
-    return Camera(camera.pinhole, *axes, width, height, camera.hfov)
-
-
-def _counted(
-    array: MirrorArray, full: Camera, sampled: tuple[int, int], radius: float
 ) -> PixelCounts:
-    """Counts of the rays themselves, through the centres of the sampled columns and rows."""
-    view = replace(full, width_px=sampled[0], height_px=sampled[1])
-    reflector = Reflector(array.camera_id, view, array.u, array.cells)
-    on, seen, disc = traced_pixels(reflector, array.theta0, radius)
-    fill = full.fill(array.cells.corners)
-    return PixelCounts(on, seen, disc, fill, sampled[0] * sampled[1])
+    """Count the pixels of a camera with a sensor, the lens and mirrors as they are.
+
+    With the sensor in place of the design's the camera is turned so that the mirrors fit it best,
+    or has `axes`: forward and right, (3,) each. `radius`: of the capture sphere, mm. Sensors beyond
+    `most_rays` are sampled by one ray for each square block of pixels.
+    """
+    camera, corners = array.camera, array.cells.corners
+    step = math.ceil(math.sqrt(sensor.width_px * sensor.height_px / most_rays))
+    width, height = -(-sensor.width_px // step), -(-sensor.height_px // step)
+    if axes is None:
+        sides = sensor.width_px, sensor.height_px
+        full = fitted_camera(camera.pinhole, corners, *sides, camera.hfov)
+    else:
+        full = Camera(camera.pinhole, *axes, sensor.width_px, sensor.height_px, camera.hfov)
+    sampled = replace(full, width_px=width, height_px=height)
+    reflector = Reflector(array.camera_id, sampled, array.u, array.cells)
+    scale = (sensor.width_px / width) ** 2
+    on, seen, disc = (scale * one for one in traced_pixels(reflector, array.theta0, radius))
+    return PixelCounts(on, seen, disc, full.fill(corners), width * height)
 
 
 def traced_pixels(
@@ -238,5 +220,5 @@ def virtual_camera_pixels(array: MirrorArray, radius: float) -> Floats:
     The array is camera a's; both halves of a mirror on the seam count together.
     """
     sensor = Sensor(array.camera.width_px, array.camera.height_px)
-    seen, halved = count_pixels(array, (sensor,), radius)[0].seen, array.u[:, 0] == 0
+    seen, halved = count_pixels(array, sensor, radius).seen, array.u[:, 0] == 0
     return np.concatenate([np.where(halved, 2 * seen, seen), seen[~halved]])

@@ -151,7 +151,13 @@ def write_turning(
     """
     facts = {"frames": len(angles), "turns_deg": np.degrees(angles).tolist()}
     with create_sequence(folder, source, facts) as writer:
-        rays = {name: _rays(source, writer, name) for name in source.frames}
+        rays = {
+            name: [
+                np.asarray(frame.planes[key][:]).reshape(-1, 3)[writer.pixel[name]].astype(float)
+                for key in ("origin", "direction")
+            ]
+            for name, frame in source.frames.items()
+        }
         for k, angle in enumerate(angles.tolist()):
             progress(f"frame {k + 1} of {len(angles)}")
             turned, back = lit_when_turned(scene, angle), _about_z(-angle)
@@ -162,26 +168,20 @@ def write_turning(
     return facts
 
 
-def _rays(source: LightField, writer: SequenceWriter, name: str) -> tuple[Floats, Floats]:
-    planes, pixel = source.frames[name].planes, writer.pixel[name]
-    origin, direction = (
-        np.asarray(planes[key][:]).reshape(-1, 3)[pixel].astype(np.float64)
-        for key in ("origin", "direction")
-    )
-    return origin, direction
-
-
-def turn_of_frame(folder: Path, number: int) -> float:
-    """The angle of a frame, radians.
+def turned_frame(folder: Path, number: int, scene: Scene, camera: Camera) -> tuple[Scene, Camera]:
+    """Object and camera as they are to each other in a frame, with the light of that frame.
 
     InputError: the sequence does not say how far the object turned.
     """
     with open_hdf5(folder / NAME, SCHEMA, "sequence", AGAIN, lambda store: store.facts) as facts:
         turned: Any = facts.get("turns_deg")
     try:
-        return float(np.radians(turned[number]))
+        angle = float(np.radians(turned[number]))
     except (TypeError, LookupError) as error:
         raise InputError(f"{folder / NAME} says nothing of frame {number}: {AGAIN}") from error
+    places = ("pinhole", "forward", "right")
+    back = {name: _about_z(-angle) @ getattr(camera, name) for name in places}
+    return lit_when_turned(scene, angle), replace(camera, **back)
 
 
 def _about_z(angle: float) -> Floats:
@@ -192,14 +192,3 @@ def lit_when_turned(scene: Scene, angle: float) -> Scene:
     """The object before its turn, with the light that it has after it."""
     normals = scene.subject.normals @ _about_z(angle).T
     return replace(scene, shade=both_sides(built_in_shade, normals))
-
-
-def camera_before_turn(camera: Camera, angle: float) -> Camera:
-    """The camera that sees the object before its turn as this one sees it after it."""
-    back = _about_z(-angle)
-    return replace(
-        camera,
-        pinhole=back @ camera.pinhole,
-        forward=back @ camera.forward,
-        right=back @ camera.right,
-    )

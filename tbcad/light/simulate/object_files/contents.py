@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tbcad.cad.formats.pictures import picture_of
 from tbcad.cad.formats.pixels import Picture
 from tbcad.common.figure_files import srgb
+from tbcad.core.geometry.vectors import facet_vectors
 from tbcad.errors import InputError
 from tbcad.types import Bytes, Floats, Ints
 
@@ -127,7 +128,7 @@ def _not_convex(counts: Ints, polygon: Ints, corners: Floats) -> list[int]:
     """Polygons of which a triangle of the fan is turned against the whole."""
     if len(polygon) == len(counts):
         return []
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    across = facet_vectors(corners)
     whole = np.zeros((len(counts), 3))
     np.add.at(whole, polygon, across)
     turned = np.einsum("tx,tx->t", across, whole[polygon]) < 0
@@ -185,14 +186,23 @@ def _without_case(folder: Path, file: Path) -> Path | None:
     return next((p for p in here if p.name.casefold() == file.name.casefold()), None)
 
 
-def texture_beside(mesh: Path, name: str, notes: list[str]) -> Bytes | None:
-    """A picture that a mesh names, as bytes (h, w, 3); None, and a note, where it is not there."""
+def textured(
+    mesh: Path, part: ObjectPart, uv: Floats | None, name: str, notes: list[str]
+) -> ObjectPart:
+    """A part with the picture that its mesh names; as it is, and a note, where that is lost."""
+    if uv is None:
+        notes.append(f"it names the texture {name}, but has no texture coordinates")
+        return part
     try:
         file = file_beside(mesh, name)
     except InputError as error:
         notes.append(f"its texture {error}")
-        return None
-    return texture(file.read_bytes(), file.name, notes)
+        return part
+    picture = texture(file.read_bytes(), file.name, notes)
+    if picture is None:
+        return part
+    source = f"texture {PureWindowsPath(name).name}"
+    return replace(part, uv=uv, picture=picture, colours=None, source=source)
 
 
 def texture(data: bytes, name: str, notes: list[str]) -> Bytes | None:

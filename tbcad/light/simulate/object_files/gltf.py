@@ -1,30 +1,46 @@
-"""glTF 2.0 (Khronos, ISO/IEC 12113): .glb and .gltf; metres, y up, colours of materials linear."""
+"""glTF 2.0 (Khronos, ISO/IEC 12113): .glb and .gltf; metres, y up.
+
+Factors and vertex colours are light, pictures sRGB (3.9).
+"""
 
 import json
 from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tbcad.common.figure_files import srgb, srgb_light
 from tbcad.errors import InputError
 from tbcad.light.simulate.object_files.contents import (
     ObjectFile,
+    ObjectPart,
+    even,
+    texture,
     uri_bytes,
     without_facets,
 )
-from tbcad.light.simulate.object_files.gltf_meshes import (
-    CUT_OFF,
-    DRACO,
-    TRANSFORM,
-    WEBP,
-    GltfFile,
-    Json,
-    primitive_part,
-)
-from tbcad.types import Floats
+from tbcad.types import Bytes, Floats, Ints
 
-MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", 0x4E4F534A, 0x004E4942
+MAGIC = b"glTF"
+JSON_START = 20  # behind the header of the file and that of its first chunk
+DRACO, GLOSSY = "KHR_draco_mesh_compression", "KHR_materials_pbrSpecularGlossiness"
+TRANSFORM, WEBP = "KHR_texture_transform", "EXT_texture_webp"
+TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+TRIANGLES, FAN = 4, 6
+OTHER_MODES = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
+LEFT_OUT = {
+    "normalTexture": "its normal map is left out",
+    "occlusionTexture": "its occlusion map is left out",
+    "emissiveTexture": "light of its materials (emissive) is left out",
+}
+CLAMP, MIRRORED = 33071, 33648
+FULL_UV = 1e-6
+CUT_OFF = "one of its buffers is cut off: copy it again"
 MOST_NODES = 100_000
 READ = {DRACO, TRANSFORM, WEBP, "KHR_mesh_quantization"}
 ONLY_LOOKS = "KHR_materials_"  # gloss, glass, cloth ...: of the surface, not of its colour
@@ -33,6 +49,59 @@ REMEDY = {
     "KHR_texture_basisu": "gltf-transform with textures as PNG",
 }
 AS_MODELLED = "are left out: it stands as it was modelled"
+Json = dict[str, Any]
+Values = NDArray[Any]
+
+
+@dataclass
+class GltfFile:
+    """A document with its buffers, the pictures that were asked for, and what is left out of it."""
+
+    path: Path
+    document: Json
+    buffers: list[bytes]
+    notes: list[str] = field(default_factory=list)
+    pictures: dict[Any, Bytes | None] = field(default_factory=dict)
+
+    def view(self, number: int) -> bytes:
+        """The bytes of a buffer view."""
+        view = self.document["bufferViews"][number]
+        start = view.get("byteOffset", 0)
+        data: bytes = self.buffers[view["buffer"]][start : start + view["byteLength"]]
+        if len(data) < view["byteLength"]:
+            raise InputError(CUT_OFF)
+        return data
+
+    def numbers(self, number: int) -> Values:
+        """A table (n, width) as it is stored."""
+        accessor = self.document["accessors"][number]
+        count, width = int(accessor["count"]), WIDTHS[accessor["type"]]
+        kind = np.dtype(TYPES[accessor["componentType"]])
+        found = np.zeros((count, width), dtype=kind)
+        if "bufferView" in accessor:
+            found = self._table(accessor, kind, count, width)
+        if "sparse" in accessor:
+            sparse, found = accessor["sparse"], found.copy()
+            where = np.dtype(TYPES[sparse["indices"]["componentType"]])
+            rows = self._table(sparse["indices"], where, sparse["count"], 1)[:, 0]
+            found[rows] = self._table(sparse["values"], kind, sparse["count"], width)
+        return found
+
+    def real(self, number: int) -> Floats:
+        """A table (n, width); whole numbers that are normalized become 0 to 1, or -1 to 1."""
+        found = self.numbers(number)
+        if self.document["accessors"][number].get("normalized") and found.dtype.kind in "iu":
+            return np.maximum(found / np.iinfo(found.dtype).max, -1.0)
+        return found.astype(np.float64)
+
+    def _table(self, at: Json, kind: np.dtype[Any], count: int, width: int) -> Values:
+        step = self.document["bufferViews"][at["bufferView"]].get("byteStride", 0)
+        steps = step or width * kind.itemsize, kind.itemsize
+        data, offset = self.view(at["bufferView"]), at.get("byteOffset", 0)
+        try:
+            return np.ndarray((count, width), kind, data, offset, steps)
+        except (TypeError, ValueError):
+            raise InputError(CUT_OFF) from None
 
 
 def read_gltf(path: Path) -> ObjectFile:
@@ -48,12 +117,12 @@ def read_gltf(path: Path) -> ObjectFile:
             how = REMEDY.get(name, "another exporter")
             raise InputError(f"it needs {name}, which is not read: write it without, as by {how}")
     file = GltfFile(path, document, _buffers(path, document, binary))
-    parts = []
-    for mesh, matrix in _placed_meshes(document):
-        for primitive in document["meshes"][mesh]["primitives"]:
-            part = primitive_part(file, primitive)
-            if part is not None:
-                parts.append(part.moved(matrix))
+    parts = [
+        part.moved(matrix)
+        for mesh, matrix in _placed_meshes(document)
+        for primitive in document["meshes"][mesh]["primitives"]
+        if (part := _primitive_part(file, primitive)) is not None
+    ]
     if not parts:
         raise without_facets(0)
     primitives = (p for mesh in document["meshes"] for p in mesh["primitives"])
@@ -71,15 +140,10 @@ def _document(path: Path) -> tuple[Json, bytes]:
     """The JSON, and the binary chunk of a .glb."""
     data, binary = path.read_bytes(), b""
     if data.startswith(MAGIC):
-        if len(data) < 20 or int.from_bytes(data[8:12], "little") > len(data):
+        if len(data) < JSON_START or int.from_bytes(data[8:12], "little") > len(data):
             raise InputError("it is cut off: copy it again")
-        chunks = dict[int, bytes]()
-        at = 12
-        while at + 8 <= len(data):
-            size, kind = (int.from_bytes(data[at + k : at + k + 4], "little") for k in (0, 4))
-            chunks.setdefault(kind, data[at + 8 : at + 8 + size])
-            at += 8 + size
-        data, binary = chunks.get(JSON_CHUNK, b""), chunks.get(BINARY_CHUNK, b"")
+        end = JSON_START + int.from_bytes(data[12:16], "little")
+        data, binary = data[JSON_START:end], data[end + 8 :]
     try:
         document = json.loads(data.decode("utf-8-sig"))
     except ValueError:
@@ -90,13 +154,10 @@ def _document(path: Path) -> tuple[Json, bytes]:
 
 
 def _buffers(path: Path, document: Json, binary: bytes) -> list[bytes]:
-    found = []
-    for buffer in document.get("buffers", []):
-        uri = buffer.get("uri")
-        data = binary if uri is None else uri_bytes(path, uri)
-        if len(data) < buffer["byteLength"]:
-            raise InputError(CUT_OFF)
-        found.append(data)
+    buffers = document.get("buffers", [])
+    found = [uri_bytes(path, one["uri"]) if "uri" in one else binary for one in buffers]
+    if any(len(data) < one["byteLength"] for data, one in zip(found, buffers, strict=True)):
+        raise InputError(CUT_OFF)
     return found
 
 
@@ -129,3 +190,160 @@ def _matrix(node: Json) -> Floats:
     matrix[:3, :3] = turn * np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)
     matrix[:3, 3] = node.get("translation", (0, 0, 0))
     return matrix
+
+
+def _primitive_part(file: GltfFile, primitive: Json) -> ObjectPart | None:
+    """The triangles of a primitive with their colours; None where it is points or lines."""
+    mode = primitive.get("mode", TRIANGLES)
+    if mode in OTHER_MODES:
+        file.notes.append(f"its {OTHER_MODES[mode]} are left out")
+        return None
+    if DRACO in primitive.get("extensions", {}):
+        attributes, index = _unpacked(file, primitive["extensions"][DRACO])
+    else:
+        attributes = {name: file.real(k) for name, k in primitive["attributes"].items()}
+        index = file.numbers(primitive["indices"])[:, 0] if "indices" in primitive else None
+    points = attributes["POSITION"][:, :3]
+    index = np.arange(len(points)) if index is None else index.astype(np.int64)
+    faces = _faces(index, mode)
+    if len(faces) and faces.max() >= len(points):
+        raise InputError("its facets name corners that do not exist: it is damaged")
+    part = ObjectPart(points, faces, attributes.get("NORMAL"))
+    part = _coloured(file, part, primitive.get("material"), attributes)
+    return part if part.normals is not None else part.flat()
+
+
+def _faces(index: Ints, mode: int) -> Ints:
+    if mode == TRIANGLES:
+        return index[: len(index) // 3 * 3].reshape(-1, 3)
+    begin = np.arange(max(len(index) - 2, 0))
+    corners = np.column_stack([0 * begin if mode == FAN else begin, begin + 1, begin + 2])
+    if mode != FAN:  # of a strip each second facet is turned
+        corners[1::2] = corners[1::2, ::-1]
+    return index[corners]
+
+
+def _unpacked(file: GltfFile, extension: Json) -> tuple[dict[str, Floats], Ints | None]:
+    """Attributes and corners of a primitive that Draco compressed."""
+    try:
+        import DracoPy
+    except ImportError:
+        raise InputError(
+            "it is compressed by Draco: pip install DracoPy, or export it without compression"
+        ) from None
+    mesh = DracoPy.decode(file.view(extension["bufferView"]))
+    attributes = {}
+    for name, identity in extension["attributes"].items():
+        values = np.asarray(mesh.get_attribute_by_unique_id(identity)["data"])
+        whole = name.startswith("COLOR") and values.dtype.kind == "u"
+        share = float(np.iinfo(values.dtype).max) if whole else 1.0
+        attributes[name] = values.reshape(len(mesh.points), -1).astype(np.float64) / share
+    return attributes, np.asarray(mesh.faces, dtype=np.int64).ravel()
+
+
+def _coloured(
+    file: GltfFile, part: ObjectPart, number: int | None, attributes: dict[str, Floats]
+) -> ObjectPart:
+    """A part with the colours of a material and of its corners, multiplied."""
+    material = {} if number is None else file.document["materials"][number]
+    factor, reference = _base(material)
+    _note_left_out(file, material, factor)
+    corner = attributes.get("COLOR_0")
+    if corner is not None and corner.shape[1] > 3 and (corner[:, 3] < 1).any():
+        file.notes.append("its transparency is left out")
+    picture = None if reference is None else _picture(file, reference, factor[:3])
+    if reference is not None and picture is not None:
+        uv = _coordinates(file, reference, attributes, part)
+        if uv is not None:
+            shares = None if corner is None else srgb(corner[:, :3].clip(0, 1))[part.faces]
+            source = f"texture {_source(file, reference)[1]}"
+            return replace(part, uv=uv, picture=picture, colours=shares, source=source)
+    if corner is not None:
+        shares, source = srgb((corner[:, :3] * factor[:3]).clip(0, 1))[part.faces], "vertex colours"
+    elif number is not None:
+        shares = even(srgb(factor[:3].clip(0, 1)), len(part.faces))
+        source = "colours of materials (baseColorFactor)"
+    else:
+        return part
+    return replace(part, colours=shares, source=source)
+
+
+def _base(material: Json) -> tuple[Floats, Json | None]:
+    """Factor (4,), light, and the reference to a texture."""
+    base = material.get("pbrMetallicRoughness", {})
+    factor, found = base.get("baseColorFactor"), base.get("baseColorTexture")
+    glossy = material.get("extensions", {}).get(GLOSSY)
+    if glossy is not None and "pbrMetallicRoughness" not in material:
+        factor, found = glossy.get("diffuseFactor"), glossy.get("diffuseTexture")
+    return np.array(factor or (1, 1, 1, 1), dtype=np.float64), found
+
+
+def _note_left_out(file: GltfFile, material: Json, factor: Floats) -> None:
+    file.notes += [note for key, note in LEFT_OUT.items() if key in material]
+    if any(value > 0 for value in material.get("emissiveFactor", ())):
+        file.notes.append(LEFT_OUT["emissiveTexture"])
+    if "metallicRoughnessTexture" in material.get("pbrMetallicRoughness", {}):
+        file.notes.append("its metallic and roughness map is left out: it is matt")
+    mode = material.get("alphaMode", "OPAQUE")
+    if mode == "MASK" or (mode != "OPAQUE" and factor[3] < 1):
+        file.notes.append("its transparency is left out")
+
+
+def _picture(file: GltfFile, reference: Json, factor: Floats) -> Bytes | None:
+    """A picture times a factor, both of light."""
+    key = (reference["index"], *factor.tolist())
+    if key not in file.pictures:
+        found = _image(file, reference)
+        if found is not None and (factor != 1).any():
+            light = srgb_light(np.arange(256) / 255)[:, None] * factor
+            curve = np.rint(255 * srgb(light.clip(0, 1))).astype(np.uint8)
+            found = np.stack([curve[found[..., k], k] for k in range(3)], axis=-1)
+        file.pictures[key] = found
+    return file.pictures[key]
+
+
+def _source(file: GltfFile, reference: Json) -> tuple[Json | None, str]:
+    """The image of a texture, None where it is of a kind that is not read, and its name."""
+    found = file.document["textures"][reference["index"]]
+    number = found.get("extensions", {}).get(WEBP, {}).get("source", found.get("source"))
+    image = None if number is None else file.document["images"][number]
+    uri = (image or {}).get("uri", "data:")
+    inside = (image or {}).get("name", "in the file")
+    return image, str(inside if uri.startswith("data:") else uri)
+
+
+def _image(file: GltfFile, reference: Json) -> Bytes | None:
+    image, name = _source(file, reference)
+    if image is None:
+        file.notes.append("one of its textures is of a kind that is not read")
+        return None
+    try:
+        inside = "bufferView" in image
+        data = file.view(image["bufferView"]) if inside else uri_bytes(file.path, image["uri"])
+    except InputError as error:
+        file.notes.append(f"its texture {error}")
+        return None
+    return texture(data, name, file.notes)
+
+
+def _coordinates(
+    file: GltfFile, reference: Json, attributes: dict[str, Floats], part: ObjectPart
+) -> Floats | None:
+    """Places (f, 3, 2) on a picture, from its lower left, moved as KHR_texture_transform says."""
+    transform = reference.get("extensions", {}).get(TRANSFORM, {})
+    number = transform.get("texCoord", reference.get("texCoord", 0))
+    given = attributes.get(f"TEXCOORD_{number}")
+    if given is None:
+        file.notes.append("it names a texture, but has no texture coordinates")
+        return None
+    turn = float(transform.get("rotation", 0.0))
+    cosine, sine = np.cos(turn), np.sin(turn)
+    scaled = given * np.array(transform.get("scale", (1, 1)), dtype=np.float64)
+    uv = scaled @ np.array([[cosine, -sine], [sine, cosine]])
+    uv += np.array(transform.get("offset", (0, 0)), dtype=np.float64)
+    sampler = file.document["textures"][reference["index"]].get("sampler")
+    if sampler is not None and not ((uv >= -FULL_UV) & (uv <= 1 + FULL_UV)).all():
+        modes = file.document["samplers"][sampler]
+        if {modes.get("wrapS"), modes.get("wrapT")} & {CLAMP, MIRRORED}:
+            file.notes.append("a texture that is clamped or mirrored beyond its edge repeats")
+    return np.column_stack([uv[:, 0], 1 - uv[:, 1]])[part.faces]

@@ -5,17 +5,11 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.geometry.vectors import dot, facet_vectors, norm, unit
 from tbcad.types import Floats, Ints
 
 SAME_PLACE = 1e-6  # of the size of an object
 LEAST = 1e-6  # of the sum of normals about a corner, as a share of that of their weights
-
-
-def facet_vectors(points: Floats, faces: Ints) -> Floats:
-    """Normals of facets (f, 3), twice as long as their areas."""
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    return np.cross(b - a, c - a)
 
 
 def first_of_each(faces: Ints) -> Ints:
@@ -62,13 +56,13 @@ def turned_outward(points: Floats, faces: Ints) -> NDArray[np.bool_]:
     turned = turned_alike(faces)
     alike = np.where(turned[:, None], faces[:, ::-1], faces)
     middle = points[alike].mean(axis=(0, 1))
-    volume = dot(points[alike[:, 0]] - middle, facet_vectors(points, alike)).sum()
+    volume = dot(points[alike[:, 0]] - middle, facet_vectors(points[alike])).sum()
     return ~turned if volume < 0 else turned
 
 
 def corner_normals(points: Floats, faces: Ints) -> Floats:
     """Normals of smooth surfaces at corners (v, 3): means by angle; zero where they cancel."""
-    across, total = unit(facet_vectors(points, faces)), np.zeros_like(points)
+    across, total = unit(facet_vectors(points[faces])), np.zeros_like(points)
     size = np.zeros(len(points))
     for k in range(3):
         here, after, before = (points[faces[:, (k + j) % 3]] for j in range(3))
@@ -84,7 +78,7 @@ def usable(points: Floats, faces: Ints, normals: Floats) -> tuple[Floats, Ints, 
 
     Corners that have none get one for each facet: that of the facet.
     """
-    across = facet_vectors(points, faces)
+    across = facet_vectors(points[faces])
     normals = unit(np.where(np.isfinite(normals), normals, 0.0))
     side = np.zeros(len(points))
     for k in range(3):

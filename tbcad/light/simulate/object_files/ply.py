@@ -1,6 +1,7 @@
-"""PLY files (G. Turk, The PLY Polygon File Format, 1994), text and binary, with their colours."""
+"""PLY files (G. Turk, The PLY Polygon File Format, 1994), text and binary; OFF files as tables."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -13,7 +14,8 @@ from tbcad.light.simulate.object_files.contents import (
     ObjectFile,
     ObjectPart,
     shown_shares,
-    texture_beside,
+    text_of,
+    textured,
     triangles,
     without_facets,
 )
@@ -24,14 +26,17 @@ TYPES = {
     "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
     "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
 }  # fmt: skip
+OFF = re.compile(r"(ST)?(C)?(N)?OFF\b")
 ENCODINGS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+CUT_OFF = "it is cut off: copy it again"
 MOST_ENTRIES = 1 << 20  # of a list
 Values: TypeAlias = NDArray[Any]
 COLOURS = (("red", "green", "blue"), ("r", "g", "b"),
            ("diffuse_red", "diffuse_green", "diffuse_blue"))  # fmt: skip
 COORDINATES = (("texture_u", "texture_v"), ("u", "v"), ("s", "t"))
+NORMALS = ("nx", "ny", "nz")
 CORNERS = ("vertex_indices", "vertex_index")
-KNOWN = {*"xyz", "nx", "ny", "nz", "alpha", "a", "diffuse_alpha", "texcoord", "texnumber", "flags",
+KNOWN = {*"xyz", *NORMALS, "alpha", "a", "diffuse_alpha", "texcoord", "texnumber", "flags",
          "quality", "confidence", *CORNERS, *sum(COLOURS, ()), *sum(COORDINATES, ())}  # fmt: skip
 
 
@@ -55,21 +60,6 @@ class List(NamedTuple):
 
 
 Table = dict[str, Any]  # columns by name: Values or List
-
-
-def read_tables(data: bytes) -> tuple[dict[str, Table], list[str]]:
-    """Tables by the name of their element, and the names of textures in comments.
-
-    InputError: it is no PLY file, or cut off.
-    """
-    encoding, elements, textures, at = _header(data)
-    order = ENCODINGS[encoding]
-    if encoding == "ascii":  # as if all of its numbers were stored as real ones
-        data, at = np.array(data[at:].split(), dtype=np.float64).tobytes(), 0
-    tables = dict[str, Table]()
-    for one in elements:
-        tables[one.name], at = _table(one, data, at, order)
-    return tables, textures
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], list[str], int]:
@@ -106,66 +96,116 @@ def _table(one: _Element, data: bytes, at: int, order: str) -> tuple[Table, int]
 
     At once where all its lists are as long as those of the first row, else row by row.
     """
-    if one.length == 0:
-        none = List(np.zeros(0, dtype=np.int64), np.zeros(0))
-        return {name: none if length else none.values for name, _, length in one.properties}, at
+    parts = list[Values]()
     try:
-        found, end = _rows(one, one.length, data, at, order)
-        lists = (column for column in found.values() if isinstance(column, List))
-        if all((column.counts == column.counts[0]).all() for column in lists):
-            return found, end
+        parts = [_rows(one, one.length, data, at, order)] if one.length else []
+        lists = [
+            part[_count(name)] for part in parts for name, _, length in one.properties if length
+        ]
+        alike = all((counts == counts[0]).all() for counts in lists)
     except InputError:
-        pass  # where lists differ in length, the first says nothing of the others
-    parts = []
-    for _ in range(one.length):
-        part, at = _rows(one, 1, data, at, order)
-        parts.append(part)
-    return {name: _joined([part[name] for part in parts]) for name, _, _ in one.properties}, at
+        alike = False  # where lists differ in length, the first says nothing of the others
+    if not alike:
+        parts, end = [], at
+        for _ in range(one.length):
+            parts.append(_rows(one, 1, data, end, order))
+            end += parts[-1].nbytes
+    table = Table()
+    for name, kind, length in one.properties:
+        values = [part[name].astype(kind).ravel() for part in parts]
+        table[name] = np.concatenate([np.zeros(0, dtype=kind), *values])
+        if length:
+            counts = [part[_count(name)].astype(np.int64) for part in parts]
+            table[name] = List(np.concatenate([np.zeros(0, dtype=np.int64), *counts]), table[name])
+    return table, at + sum(part.nbytes for part in parts)
 
 
-def _rows(one: _Element, count: int, data: bytes, at: int, order: str) -> tuple[Table, int]:
-    """Columns of rows that are all as the first, and where they end."""
+def _rows(one: _Element, count: int, data: bytes, at: int, order: str) -> Values:
+    """Rows that are all as the first, as fields by name; InputError: there are not so many."""
     fields = list[Any]()
-    for k, (name, kind, length) in enumerate(one.properties):
+    for name, kind, length in one.properties:
         if length is None:
-            fields.append((f"{k}", _stored(kind, order)))
+            fields.append((name, _stored(kind, order)))
             continue
-        size = _first(data, at + np.dtype(fields).itemsize, _stored(length, order))
+        place, stored = at + np.dtype(fields).itemsize, np.dtype(_stored(length, order))
+        if place + stored.itemsize > len(data):
+            raise InputError(CUT_OFF)
+        size = int(np.frombuffer(data, stored, 1, place)[0])
         if not 0 <= size <= MOST_ENTRIES:
             raise InputError(f"its list {name} has {size} entries: it is damaged")
-        fields += [(f"{k}n", _stored(length, order)), (f"{k}", _stored(kind, order), (size,))]
+        fields += [(_count(name), stored), (name, _stored(kind, order), (size,))]
     row = np.dtype(fields)
-    end = at + count * row.itemsize
-    if end > len(data):
-        raise InputError("it is cut off: copy it again")
-    table, columns = np.frombuffer(data, row, count, at), Table()
-    for k, (name, kind, length) in enumerate(one.properties):
-        values = table[f"{k}"].astype(kind)
-        columns[name] = List(table[f"{k}n"].astype(np.int64), values.ravel()) if length else values
-    return columns, end
+    if at + count * row.itemsize > len(data):
+        raise InputError(CUT_OFF)
+    return np.frombuffer(data, row, count, at)
+
+
+def _count(name: str) -> str:
+    """The field of the length of a list."""
+    return f"number of {name}"
 
 
 def _stored(kind: str, order: str) -> str:
     return order + kind if order else "f8"
 
 
-def _first(data: bytes, at: int, kind: str) -> int:
-    """The number at a place."""
-    try:
-        return int(np.frombuffer(data, kind, 1, at)[0])
-    except ValueError:
-        raise InputError("it is cut off: copy it again") from None
-
-
-def _joined(parts: list[Any]) -> Values | List:
-    if not isinstance(parts[0], List):
-        return np.concatenate(parts)
-    return List(*(np.concatenate([part[k] for part in parts]) for k in range(2)))
-
-
 def read_ply(path: Path) -> ObjectFile:
     """Read a mesh; InputError: it is no PLY file, cut off, or without facets."""
-    tables, textures = read_tables(path.read_bytes())
+    data = path.read_bytes()
+    encoding, elements, textures, at = _header(data)
+    order = ENCODINGS[encoding]
+    if encoding == "ascii":  # as if all of its numbers were stored as real ones
+        data, at = np.array(data[at:].split(), dtype=np.float64).tobytes(), 0
+    tables = dict[str, Table]()
+    for one in elements:
+        tables[one.name], at = _table(one, data, at, order)
+    return _mesh(path, tables, textures, [])
+
+
+def read_off(path: Path) -> ObjectFile:
+    """Read a mesh; InputError: it is no OFF file of text in three dimensions, or cut off."""
+    text = text_of(path.read_bytes())
+    lines = [line.partition("#")[0].strip() for line in text.splitlines()]
+    lines = [line for line in lines if line]
+    match = OFF.match(lines[0]) if lines else None
+    if match is None or "BINARY" in lines[0]:
+        raise InputError("its first line is not OFF, COFF, NOFF, STOFF: write it as text")
+    rest = lines[0][match.end() :].strip()
+    lines = [rest, *lines[1:]] if rest else lines[1:]
+    points, facets = (int(number) for number in lines[0].split()[:2])
+    rows = [line.split() for line in lines[1 : 1 + points + facets]]
+    if len(rows) < points + facets:
+        raise InputError(CUT_OFF)
+    vertices, polygons = rows[:points], rows[points:]
+    names = [*"xyz", *NORMALS] if match[3] else [*"xyz"]
+    vertex, notes = _columns(vertices, names), list[str]()
+    counts = [int(row[0]) for row in polygons]
+    index = [int(n) for row, k in zip(polygons, counts, strict=True) for n in row[1 : 1 + k]]
+    face: Table = {CORNERS[0]: List(np.array(counts), np.array(index))}
+    own = [row[1 + k :] for row, k in zip(polygons, counts, strict=True)]
+    widths = {len(row) for row in own}
+    if match[2]:
+        vertex |= _columns([row[len(names) :] for row in vertices], COLOURS[0])
+    elif widths <= {3, 4}:
+        face |= _columns(own, (*COLOURS[0], *["alpha"] * (widths == {4})))
+    elif widths != {0}:
+        notes.append("colours of some of its faces only, or by a colour map, are left out")
+    return _mesh(path, {"vertex": vertex, "face": face}, [], notes)
+
+
+def _columns(rows: list[list[str]], names: Sequence[str]) -> Table:
+    """The first columns of text: whole numbers if none has a point, else real ones."""
+    cells = [row[: len(names)] for row in rows]
+    if any(len(row) < len(names) for row in cells):
+        raise InputError(f"one of its lines has fewer numbers than {' '.join(names)}")
+    values = np.array(cells, dtype=np.float64).reshape(-1, len(names))
+    real = any("." in number for row in cells for number in row) or (values % 1 != 0).any()
+    return dict(zip(names, values.astype(np.float64 if real else np.int64).T, strict=True))
+
+
+def _mesh(
+    path: Path, tables: dict[str, Table], textures: list[str], notes: list[str]
+) -> ObjectFile:
     vertex, face = tables.get("vertex", {}), tables.get("face", {})
     if not {*"xyz"} <= vertex.keys():
         raise InputError("its vertices have no x, y, z")
@@ -174,12 +214,11 @@ def read_ply(path: Path) -> ObjectFile:
     if corners is None or len(corners.counts) == 0:
         raise without_facets(len(points))
     index = corners.values.astype(np.int64)
-    if len(index) and not (index.min() >= 0 and index.max() < len(points)):
+    if len(index) != corners.counts.sum() or ((index < 0) | (index >= len(points))).any():
         raise InputError("its facets name corners that do not exist: it is damaged")
     cut, polygon = triangles(corners.counts, points[index])
     faces = index[cut]
-    notes = list[str]()
-    normals = _stack(vertex, ("nx", "ny", "nz")) if "nz" in vertex else None
+    normals = _stack(vertex, NORMALS) if "nz" in vertex else None
     colours, source = _colours(vertex, face, faces, polygon, notes)
     uv = _coordinates(vertex, face, corners.counts, cut, faces)
     whole = ObjectPart(points, faces, normals, colours, source=source)
@@ -229,21 +268,17 @@ def _textured(
     notes: list[str],
 ) -> list[ObjectPart]:  # fmt: skip
     """The mesh by its textures; colours stay where there is none."""
-    if uv is None or not textures:
+    if not textures:
         if uv is not None:
             notes.append("it has texture coordinates, but names no texture (comment TextureFile)")
-        elif textures:
-            notes.append(f"it names the texture {textures[0]}, but has no texture coordinates")
         return [whole]
+    if uv is None:
+        return [textured(path, whole, uv, textures[0], notes)]
     parts = []
     for k in np.unique(number).tolist():
         own = number == k
         name = textures[k] if 0 <= k < len(textures) else textures[0]
-        picture = texture_beside(path, name, notes)
         colours = None if whole.colours is None else whole.colours[own]
         part = replace(whole, faces=whole.faces[own], colours=colours)
-        if picture is not None:
-            part = replace(part, colours=None, uv=uv[own], picture=picture,
-                           source=f"texture {Path(name).name}")  # fmt: skip
-        parts.append(part)
+        parts.append(textured(path, part, uv[own], name, notes))
     return parts

@@ -1,6 +1,6 @@
 """3MF files, read by lib3mf: parts as they are built, with colours of triangles."""
 
-from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,25 +29,20 @@ def read_3mf(path: Path) -> ObjectFile:
         reader.ReadFromFile(str(path))
     except lib3mf.ELib3MFException as error:
         raise InputError(f"lib3mf says: {error}") from None
-    notes = list[str]()
-    parts = [part for item in _items(model.GetBuildItems())
-             for part in _parts(model, item.GetObjectResource(),
-                                _matrix(item.GetObjectTransform()), notes)]  # fmt: skip
+    notes, parts, items = list[str](), list[ObjectPart](), model.GetBuildItems()
+    while items.MoveNext():
+        item = items.GetCurrent()
+        matrix = _matrix(item.GetObjectTransform())
+        parts += _parts(model, item.GetObjectResource(), matrix, notes)
     if not parts:
         raise InputError("it builds no mesh: its build section is empty")
     return ObjectFile(parts, list(dict.fromkeys(notes)), UNITS[int(model.GetUnit())], "z")
 
 
-def _items(iterator: Any) -> Iterator[Any]:
-    while iterator.MoveNext():
-        yield iterator.GetCurrent()
-
-
 def _matrix(transform: Any) -> Floats:
     """A matrix (4, 4) of 3MF's rows, which multiply points from the right."""
-    matrix = np.eye(4)
-    matrix[:3] = np.array([list(row) for row in transform.Fields], dtype=np.float64).T
-    return matrix
+    rows = np.array([list(row) for row in transform.Fields], dtype=np.float64)
+    return np.vstack([rows.T, [0, 0, 0, 1]])
 
 
 def _parts(
@@ -61,36 +56,29 @@ def _parts(
         return [part.moved(matrix)] if len(part.faces) else []
     if not found.IsComponentsObject():
         return []
-    whole = model.GetComponentsObjectByID(found.GetUniqueResourceID())
-    parts = []
+    whole, parts = model.GetComponentsObjectByID(found.GetUniqueResourceID()), list[ObjectPart]()
     for k in range(whole.GetComponentCount()):
         one = whole.GetComponent(k)
-        own = _matrix(one.GetTransform()) if one.HasTransform() else np.eye(4)
-        parts += _parts(model, one.GetObjectResource(), matrix @ own, notes, deep + 1)
+        own = matrix @ _matrix(one.GetTransform()) if one.HasTransform() else matrix
+        parts += _parts(model, one.GetObjectResource(), own, notes, deep + 1)
     return parts
 
 
 def _part(model: Any, mesh: Any, notes: list[str]) -> ObjectPart:
+    """A mesh with the colours of its triangles, or that of the whole."""
     points = np.array([list(one.Coordinates) for one in mesh.GetVertices()], dtype=np.float64)
     faces = np.array([list(one.Indices) for one in mesh.GetTriangleIndices()], dtype=np.int64)
     part = ObjectPart(points.reshape(-1, 3), faces.reshape(-1, 3))
-    colours = _colours(model, mesh, len(faces), notes)
-    if colours is None:
-        return part
-    return ObjectPart(part.points, part.faces, None, colours, source="colours of triangles")
-
-
-def _colours(model: Any, mesh: Any, facets: int, notes: list[str]) -> Floats | None:
-    """Colours (f, 3, 3) of a mesh's triangles, else of the whole; None where it has none."""
     keys = [(one.ResourceID, tuple(one.PropertyIDs)) for one in mesh.GetAllTriangleProperties()]
     resource, number, whole = mesh.GetObjectLevelProperty()
     fallback = _colour(model, resource, number, notes) if whole else None
     known = {(r, p): _colour(model, r, p, notes) for r, three in set(keys) if r for p in three}
     if fallback is None and not any(colour is not None for colour in known.values()):
-        return None
+        return part
     other = fallback or (GREY,) * 3
     rows = [[known.get((r, p)) or other for p in three] for r, three in keys]
-    return np.array(rows or [[other] * 3] * facets, dtype=np.float64)
+    colours = np.array(rows or [[other] * 3] * len(faces), dtype=np.float64)
+    return replace(part, colours=colours, source="colours of triangles")
 
 
 def _colour(

@@ -1,6 +1,7 @@
 """OBJ files with their MTL files (Wavefront, Advanced Visualizer, appendix B, 1995)."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from tbcad.light.simulate.object_files.contents import (
     file_beside,
     shown_shares,
     text_of,
-    texture_beside,
+    textured,
     triangles,
     without_facets,
 )
@@ -25,6 +26,7 @@ from tbcad.types import Floats, Ints
 OPTIONS = re.compile(r"((?:-[a-z]+(?:\s+(?:on|off|[-+.\de]+|[rgbmlz]))+\s+)*)(.*)", re.IGNORECASE)
 IGNORED = {"bump", "norm", "disp", "refl", "map_bump", "map_ks", "map_ke", "map_d", "map_ns",
            "map_pr", "map_pm", "map_ka", "decal"}  # fmt: skip
+OPAQUE = {"d": 1.0, "tr": 0.0}
 TABLES = ("v", "vt", "vn")
 LEFT_OUT = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
 
@@ -68,25 +70,24 @@ def read_obj(path: Path) -> ObjectFile:
     notes = [f"its {what} are left out" for what in sorted(left_out)]
     if not facets.corners:
         raise without_facets(len(tables["v"]))
-    vertices = _table(tables, "v", 3)
+    vertices, normals = _table(tables, "v", 3), _table(tables, "vn", 3)[:, :3]
+    uv = _table(tables, "vt", 2)[:, :2]
     # many programs write colours behind places: v x y z r g b
     colours = shown_shares(vertices[:, -3:]) if vertices.shape[1] in (6, 7) else None
     counts, index = _corners(facets, [len(tables[name]) for name in TABLES])
-    faces, polygon = triangles(counts, vertices[index[:, 0], :3])
+    cut, polygon = triangles(counts, vertices[index[:, 0], :3])
     materials = _materials(path, tables["mtllib"], notes)
     names, which = np.unique(np.array(facets.material), return_inverse=True)
     parts = []
     for k, name in enumerate(names.tolist()):
-        own = index[faces[which[polygon] == k]]
-        part, vertex = _part(tables, vertices[:, :3], own)
-        uv = None
-        if tables["vt"] and not (own[..., 1] < 0).any():
-            uv = _table(tables, "vt", 2)[:, :2][own[..., 1]]
         if name and materials is not None and name not in materials:
             notes.append(f"its material {name} is in no MTL file")
-        corner = None if colours is None else colours[vertex][part.faces]
-        used = (materials or {}).get(name, _Material())
-        parts.append(_coloured(path, part, uv, corner, used, notes))
+        own = index[cut[which[polygon] == k]]
+        part = _part(vertices[:, :3], normals, own)
+        if colours is not None:
+            part = replace(part, colours=colours[own[..., 0]], source="vertex colours")
+        on = uv[own[..., 1]] if len(uv) and not (own[..., 1] < 0).any() else None
+        parts.append(_painted(path, part, on, (materials or {}).get(name, _Material()), notes))
     return ObjectFile([part for part in parts if len(part.faces)], list(dict.fromkeys(notes)))
 
 
@@ -105,7 +106,9 @@ def _corners(facets: _Facets, limits: list[int]) -> tuple[Ints, Ints]:
     Numbers are from 0; -1 where there is none. Negative ones in the file count back from the line.
     """
     counts = np.array([len(corners) for corners in facets.corners], dtype=np.int64)
-    index = _index([token for corners in facets.corners for token in corners])
+    tokens = (token + "//" for corners in facets.corners for token in corners)
+    numbers = [int(number or 0) for token in tokens for number in token.split("/")[:3]]
+    index = np.array(numbers, dtype=np.int64).reshape(-1, 3)
     known = np.repeat(np.array(facets.known, dtype=np.int64), counts, axis=0)
     index = np.where(index > 0, index - 1, np.where(index < 0, known + index, -1))
     if (index[:, 0] < 0).any() or (index >= limits).any() or (index < -1).any():
@@ -113,69 +116,48 @@ def _corners(facets: _Facets, limits: list[int]) -> tuple[Ints, Ints]:
     return counts, index
 
 
-def _index(tokens: list[str]) -> Ints:
-    """Numbers (c, 3) of corners as 1/2/3, 1//3, 1/2 or 1; 0 where there is none."""
-    slashes = {token.count("/") for token in tokens}
-    numbers = " ".join(tokens).replace("//", "/0/").replace("/", " ").split()
-    index = np.zeros((len(tokens), 3), dtype=np.int64)
-    width = 1 + max(slashes, default=0)
-    if len(slashes) == 1 and len(numbers) == width * len(tokens) and width <= 3:
-        index[:, :width] = np.array(list(map(int, numbers))).reshape(-1, width)
-        return index
-    for row, token in enumerate(tokens):
-        parts = token.split("/")[:3]
-        index[row, : len(parts)] = [int(part or 0) for part in parts]
-    return index
-
-
-def _part(tables: dict[str, list[str]], points: Floats, index: Ints) -> tuple[ObjectPart, Ints]:
-    """Facets by corner, and vertex, texture place and normal, (f, 3, 3); and their vertices."""
-    normals = np.concatenate([np.zeros((1, 3)), _table(tables, "vn", 3)[:, :3]])
-    key = index[..., 0].ravel() * len(normals) + index[..., 2].ravel() + 1
+def _part(points: Floats, normals: Floats, index: Ints) -> ObjectPart:
+    """Facets by vertex, texture place and normal of their corners, (f, 3, 3)."""
+    key = index[..., 0].ravel() * (len(normals) + 1) + index[..., 2].ravel() + 1
     own, faces = np.unique(key, return_inverse=True)
-    vertex, normal = np.divmod(own, len(normals))
-    shaded = normals[normal] if tables["vn"] else None
-    return ObjectPart(points[vertex], faces.reshape(-1, 3), shaded), vertex
+    vertex, normal = np.divmod(own, len(normals) + 1)
+    shaded = np.concatenate([np.zeros((1, 3)), normals])[normal] if len(normals) else None
+    return ObjectPart(points[vertex], faces.reshape(-1, 3), shaded)
 
 
-def _coloured(
-    path: Path, part: ObjectPart, uv: Floats | None, colours: Floats | None, material: _Material,
-    notes: list[str],
-) -> ObjectPart:  # fmt: skip
+def _painted(
+    path: Path, part: ObjectPart, uv: Floats | None, material: _Material, notes: list[str]
+) -> ObjectPart:
     """The part with its texture, else colours of its corners, else its material's."""
-    if material.picture is not None and uv is None:
-        notes.append(f"it names the texture {material.picture}, but has no texture coordinates")
-    elif material.picture is not None:
-        picture = texture_beside(path, material.picture, notes)
-        if picture is not None:
-            file = material.picture.replace("\\", "/").rpartition("/")[2]
-            return replace(part, uv=uv, picture=picture, source=f"texture {file}")
-    elif uv is not None and material.colour is None and colours is None:
+    if not part.source and material.colour is not None:
+        colours = even(material.colour, len(part.faces))
+        part = replace(part, colours=colours, source="colours of materials (Kd)")
+    if material.picture is not None:
+        return textured(path, part, uv, material.picture, notes)
+    if uv is not None and not part.source:
         notes.append("it has texture coordinates, but names no texture (map_Kd)")
-    if colours is not None:
-        return replace(part, colours=colours, source="vertex colours")
-    if material.colour is not None:
-        return replace(part, colours=even(material.colour, len(part.faces)),
-                     source="colours of materials (Kd)")  # fmt: skip
     return part
 
 
 def _materials(path: Path, libraries: list[str], notes: list[str]) -> dict[str, _Material] | None:
     """Materials by name; None where the file names no file of them that is there."""
     found = dict[str, _Material]()
-    files = list[Path]()
-    for names in libraries:
-        try:
-            files.append(file_beside(path, names))
-        except InputError:
-            for name in names.split():
-                try:
-                    files.append(file_beside(path, name))
-                except InputError as error:
-                    notes.append(f"its materials {error}")
+    files = [file for names in libraries for file in _files(path, names, notes)]
     for file in files:
         _read_materials(file, found, notes)
     return found if files else None
+
+
+def _files(path: Path, names: str, notes: list[str]) -> Iterator[Path]:
+    """The files that a line names: one whose name may have spaces, else one a word."""
+    try:
+        yield file_beside(path, names)
+    except InputError:
+        for name in names.split():
+            try:
+                yield file_beside(path, name)
+            except InputError as error:
+                notes.append(f"its materials {error}")
 
 
 def _read_materials(file: Path, found: dict[str, _Material], notes: list[str]) -> None:
@@ -188,45 +170,31 @@ def _read_materials(file: Path, found: dict[str, _Material], notes: list[str]) -
                 material = found.setdefault(rest, _Material())
             case "kd":
                 material.colour = _colour(rest, notes)
-            case "map_kd" if rest:
-                options, material.picture = _picture(rest)
-                if options:
-                    notes.append(f"options of a texture are left out: {options}")
+            case "map_kd" if rest and (match := OPTIONS.fullmatch(rest)):
+                material.picture = match[2].strip()
+                if match[1]:
+                    notes.append(f"options of a texture are left out: {match[1].strip()}")
             case "d" | "tr":
-                if _is_transparent(key, rest):
+                if _numbers(rest)[:1] not in ([], [OPAQUE[key]]):
                     notes.append("its transparency is left out")
             case "ke":
-                if any(number not in {"0", "0.0"} and _number(number) > 0
-                       for number in rest.split()):  # fmt: skip
+                if any(number > 0 for number in _numbers(rest)):
                     notes.append("light of its materials (Ke) is left out")
             case _ if key in IGNORED:
                 notes.append(f"its {line.split()[0]} is left out")
 
 
-def _picture(text: str) -> tuple[str, str]:
-    match = OPTIONS.fullmatch(text)
-    return (match[1].strip(), match[2].strip()) if match else ("", text)
-
-
-def _number(text: str) -> float:
+def _numbers(text: str) -> list[float]:
+    """Numbers before a comment; none where one is none."""
     try:
-        return float(text)
+        return [float(number) for number in text.partition("#")[0].split()]
     except ValueError:
-        return 0.0
-
-
-def _is_transparent(key: str, rest: str) -> bool:
-    numbers = rest.split()
-    opaque = {"d": 1.0, "tr": 0.0}[key]
-    return bool(numbers) and numbers[0][0].isdigit() and _number(numbers[0]) != opaque
+        return []
 
 
 def _colour(text: str, notes: list[str]) -> list[float] | None:
     """Red, green and blue; one number is grey."""
-    try:
-        numbers = [float(number) for number in text.partition("#")[0].split()]
-    except ValueError:
-        numbers = []
+    numbers = _numbers(text)
     numbers = numbers * 3 if len(numbers) == 1 else numbers
     if len(numbers) != 3 or not all(0 <= number <= 1 + ROUNDING for number in numbers):
         notes.append(f"its colour Kd {text:.40} is not understood: allowed are three of 0 to 1")

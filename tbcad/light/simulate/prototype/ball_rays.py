@@ -9,6 +9,8 @@ from typing import TypeAlias
 import numpy as np
 
 from tbcad.common.compiled import compiled
+from tbcad.core.geometry.loop_vectors import Vector, divided, minus, vector
+from tbcad.core.geometry.loop_vectors import dot as loop_dot
 from tbcad.core.geometry.vectors import dot
 from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
@@ -76,18 +78,12 @@ def _reflected(
     return BallHits(ball, origin, reflected, distance)
 
 
-def reflected_colours(scene: Scene, hits: BallHits) -> Colours:
-    """Colours (n, 3) of the object's images in the balls, 0 to 255."""
-    colour = np.zeros((len(hits.ball), 3), dtype=np.float32)
-    on = np.flatnonzero(hits.ball)
-    colour[on] = cast_rays(scene, hits.origin[on], hits.direction[on]).colour
-    return colour
-
-
 def camera_colours(scene: Scene, pinhole: Floats, direction: Floats, hits: BallHits) -> Colours:
     """What a camera records along unit directions (n, 3) that meet balls, 0 to 255."""
+    colour, on = np.zeros((len(hits.ball), 3), dtype=np.float32), np.flatnonzero(hits.ball)
+    colour[on] = cast_rays(scene, hits.origin[on], hits.direction[on]).colour
     front, direct = object_in_front(scene, pinhole, direction, hits.distance)
-    return np.where(front[:, None], direct, reflected_colours(scene, hits))
+    return np.where(front[:, None], direct, colour)
 
 
 def image_points(camera: LensCamera, direction: Floats) -> Floats:
@@ -147,12 +143,13 @@ def balls_between(start: Floats, end: Floats, balls: Floats, walls: WallTable) -
     """Whether a ball (k, 8) within its walls is between points (n, 3), which may be on balls."""
     hidden = np.zeros(len(start), dtype=np.bool_)
     for i in range(len(start)):
-        way = end[i] - start[i]
-        length = np.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
-        way /= length
+        begin = vector(start[i])
+        way = minus(vector(end[i]), begin)
+        length = np.sqrt(loop_dot(way, way))
+        way = divided(way, length)
         for k in range(len(balls)):
             own = walls[1][walls[0][k] : walls[0][k + 1]]
-            first, last, _ = _body_span(start[i], way, balls[k], own)
+            first, last, _ = _body_span(begin, way, balls[k], own)
             if first <= last and ON_BALL_MM < first < length - ON_BALL_MM:
                 hidden[i] = True
     return hidden
@@ -164,28 +161,26 @@ def points_within_walls(point: Floats, ball: Ints, walls: WallTable) -> Bools:
     inside = np.zeros(len(point), dtype=np.bool_)
     for i in range(len(point)):
         own = walls[1][walls[0][ball[i]] : walls[0][ball[i] + 1]]
-        inside[i] = within_walls(own, (point[i, 0], point[i, 1], point[i, 2]))
+        inside[i] = within_walls(own, vector(point[i]))
     return inside
 
 
 @compiled
 def _body_span(
-    start: Floats, direction: Floats, ball: Floats, walls: Floats
+    start: Vector, direction: Vector, ball: Floats, walls: Floats
 ) -> tuple[float, float, float]:
     """Where a ray enters and leaves what a ball (8,) is, and where it enters its sphere.
 
     That is what both its spheres have in common, on the inner side of its walls (k, 6).
     """
-    enters, leaves = _span(start, direction, ball[:3], ball[3])
-    body_enters, body_leaves = _span(start, direction, ball[4:7], ball[7])
+    enters, leaves = _span(start, direction, vector(ball), ball[3])
+    body_enters, body_leaves = _span(start, direction, vector(ball, 4), ball[7])
     first, last = max(enters, body_enters), min(leaves, body_leaves)
     if first > last:
         return first, last, enters
     for wall in walls:
-        value = rate = 0.0
-        for j in range(3):
-            value += (start[j] - wall[j]) * wall[3 + j]
-            rate += direction[j] * wall[3 + j]
+        inward = vector(wall, 3)
+        value, rate = loop_dot(minus(start, vector(wall)), inward), loop_dot(direction, inward)
         if rate > 0:
             first = max(first, -value / rate)
         elif rate < 0:
@@ -196,14 +191,11 @@ def _body_span(
 
 
 @compiled
-def _span(pinhole: Floats, direction: Floats, centre: Floats, radius: float) -> tuple[float, float]:
+def _span(start: Vector, direction: Vector, centre: Vector, radius: float) -> tuple[float, float]:
     """Where a ray enters and leaves a sphere; infinite and minus infinite where it misses."""
-    along, power = 0.0, -radius * radius
-    for j in range(3):
-        offset = pinhole[j] - centre[j]
-        along += offset * direction[j]
-        power += offset * offset
-    root = along * along - power
+    x, y, z = minus(start, centre)
+    along = loop_dot((x, y, z), direction)
+    root = along * along - (-radius * radius + x * x + y * y + z * z)
     if root < 0:
         return np.inf, -np.inf
     return -along - np.sqrt(root), -along + np.sqrt(root)
@@ -219,10 +211,12 @@ def _first_ball(
     pedestal through a wall does: no ball, but it hides what is behind.
     """
     ball, distance = np.zeros(len(direction), dtype=np.int64), np.full(len(direction), np.inf)
+    start = vector(pinhole)
     for i in range(len(direction)):
+        way = vector(direction[i])
         for k in range(balls.shape[1]):
             own = walls[1][walls[0][k] : walls[0][k + 1]]
-            first, last, enters = _body_span(pinhole, direction[i], balls[stop[i], k], own)
+            first, last, enters = _body_span(start, way, balls[stop[i], k], own)
             if 0 < first < distance[i] and first <= last:
                 distance[i] = first
                 ball[i] = k + 1 if enters >= first - SAME_MM else 0

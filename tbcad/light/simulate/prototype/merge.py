@@ -27,7 +27,7 @@ from tbcad.light.simulate.prototype.ball_rays import (
 )
 from tbcad.light.simulate.prototype.run import PrototypeRun
 from tbcad.light.simulate.scene.ray_casting import Scene, object_in_front
-from tbcad.light.simulate.scene.rays import Shift, TracedRays, exact_tracer, pixel_directions
+from tbcad.light.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
 from tbcad.light.simulate.scene.reflector import MARGIN_PX
 from tbcad.types import Bools, Bytes, Floats, Ints, Progress
 
@@ -94,40 +94,22 @@ def merge_photographs(
     """
     picture, shown = _resampled(plan, photographs, progress)
     known = replace(plan, ball=np.where(shown[plan.stop], plan.ball, NO_BALL))
-
-    def colours(rows: range, some: Bools) -> Bytes:
-        return np.asarray(picture[rows.start : rows.stop].reshape(-1, 3) * some[:, None])
-
-    yield from merged_bands(known, colours, progress)
-
-
-def merged_bands(
-    plan: MergePlan, colours: Callable[[range, Bools], Bytes], progress: Progress
-) -> Iterator[RowBand]:
-    """Bands of the merged picture from top to bottom.
-
-    `colours` gives colours (n, 3) of a band, from its rows and where they show something, (n,).
-    """
-    height = plan.run.reflector.camera.height_px
     yield from in_batches(
-        partial(_band, plan, colours),
-        row_bands(height),
-        lambda rows: progress(f"row {rows.start} of {height}"),
+        partial(_band, known, picture),
+        row_bands(len(picture)),
+        lambda rows: progress(f"row {rows.start} of {len(picture)}"),
     )
 
 
-def merged_pixels(
-    plan: MergePlan, rows: range, shift: Shift = CENTRE
-) -> tuple[Ints, BallHits, Bools, Floats]:
+def merged_pixels(plan: MergePlan, rows: range) -> tuple[Ints, BallHits, Bools]:
     """The n pixels of a band, each rotated with its mirror's window.
 
     Returns the mirror that each belongs to, from 1, 0 for none, (n,); what it meets, where only the
-    ball in place of its mirror is a ball; whether the object itself is in front of that, (n,); and
-    the rotated unit directions, (n, 3).
+    ball in place of its mirror is a ball; and whether the object itself is in front of that, (n,).
     """
     run = plan.run
-    mirror = plan.trace_shell(rows, shift).mirror.ravel().astype(np.int64)
-    straight = unit(pixel_directions(run.reflector.camera, rows, shift).reshape(-1, 3))
+    mirror = plan.trace_shell(rows, CENTRE).mirror.ravel().astype(np.int64)
+    straight = unit(pixel_directions(run.reflector.camera, rows).reshape(-1, 3))
     direction = np.einsum("nx,nxy->ny", straight, plan.rotation[mirror])
     hits = (
         trace_own_ball(run, direction, plan.stop[mirror], plan.ball[mirror])
@@ -137,7 +119,7 @@ def merged_pixels(
     inside = np.isfinite(image_points(run.camera, direction)[:, 0])
     ball = np.where(inside & (hits.ball == plan.ball[mirror]), hits.ball, 0)
     front = inside & plan.in_front(mirror, direction, hits.distance)
-    return mirror, replace(hits, ball=ball), front, direction
+    return mirror, replace(hits, ball=ball), front
 
 
 def _object_box(run: PrototypeRun, radius: float) -> Ints:
@@ -202,17 +184,17 @@ def _pixels_of(mirror: NDArray[np.uint16], box: Ints, number: int) -> Ints:
     return np.column_stack([column + x0, row + y0])
 
 
-def _band(plan: MergePlan, colours: Callable[[range, Bools], Bytes], rows: range) -> RowBand:
-    mirror, hits, front, _ = merged_pixels(plan, rows)
-    shape = (len(rows), plan.run.reflector.camera.width_px)
+def _band(plan: MergePlan, picture: Bytes, rows: range) -> RowBand:
+    mirror, hits, front = merged_pixels(plan, rows)
+    colour = picture[rows.start : rows.stop]
+    shape = colour.shape[:2]
     rays = TracedRays(
         mirror.astype(np.int32).reshape(shape),
-        hits.origin.reshape(*shape, 3),
-        hits.direction.reshape(*shape, 3),
+        hits.origin.reshape(colour.shape),
+        hits.direction.reshape(colour.shape),
     )
-    removed = (hits.ball == 0) | front
-    colour = colours(rows, (hits.ball > 0) | front)
-    return RowBand(rows, rays.without(removed.reshape(shape)), colour.reshape(*shape, 3))
+    on, front = (hits.ball > 0).reshape(shape), front.reshape(shape)
+    return RowBand(rows, rays.without(~on | front), colour * (on | front)[..., None])
 
 
 @dataclass(frozen=True)

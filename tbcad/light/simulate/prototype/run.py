@@ -82,7 +82,7 @@ def read_plan(exported: ExportedDesign) -> Plan:
     _check_frame(record, exported, frame)
     _check_balls(table, balls)
     mirrors = len(exported.reflectors[0])
-    ball, stop = _served(plan_file, pictures, len(balls), mirrors)
+    ball, stop, error_deg = _served(plan_file, pictures, len(balls), mirrors)
     plan = Plan(
         frame=frame,
         apex=columns(balls, APEX),
@@ -92,10 +92,10 @@ def read_plan(exported: ExportedDesign) -> Plan:
         body_radius=columns(balls, "body_radius_mm")[:, 0],
         moved=document.picture == "moved",
         angle=np.radians(_angles(plan_file, pictures)),
-        ball=ball,
-        stop=stop,
+        ball=ball.astype(np.int64),
+        stop=stop.astype(np.int64),
     )
-    _check_errors(plan_file, pictures, plan, exported)
+    _check_errors(plan_file, error_deg, plan, exported)
     return plan
 
 
@@ -147,9 +147,9 @@ def _angles(path: Path, pictures: list[PictureRow]) -> Floats:
     return angle
 
 
-def _served(path: Path, pictures: list[PictureRow], balls: int, mirrors: int) -> tuple[Ints, Ints]:
-    """Ball and stop, from 0, of each mirror of camera a and of camera b, (2, m)."""
-    ball_and_stop = np.full((2, 2, mirrors), -1, dtype=np.int64)
+def _served(path: Path, pictures: list[PictureRow], balls: int, mirrors: int) -> Floats:
+    """Ball and stop, from 0, and error of each mirror of camera a and of camera b, (3, 2, m)."""
+    served = np.full((3, 2, mirrors), -1.0)
     for row, one in enumerate(pictures, 1):
         turn, wrong = one.object_turn_deg, ""
         camera, mirror = int(turn != 0), int(one.mirror[1:]) - 1
@@ -162,28 +162,23 @@ def _served(path: Path, pictures: list[PictureRow], balls: int, mirrors: int) ->
                 f"shows {one.mirror}, allowed with the object turned by {turn:g} degrees is "
                 f"{_name(camera, 0)} to {_name(camera, mirrors - 1)}"
             )
-        elif ball_and_stop[0, camera, mirror] >= 0:
+        elif served[0, camera, mirror] >= 0:
             wrong = f"shows {one.mirror} a second time"
         if wrong:
             raise InputError(f"{path}: row {row} {wrong}: {REBUILD}")
-        ball_and_stop[:, camera, mirror] = one.ball - 1, one.stop - 1
-    missing = np.argwhere(ball_and_stop[0] < 0)
+        served[:, camera, mirror] = one.ball - 1, one.stop - 1, one.error_deg
+    missing = np.argwhere(served[0] < 0)
     if missing.size:
         raise InputError(f"{path} does not show mirror {_name(*missing[0].tolist())}: {REBUILD}")
-    return ball_and_stop[0], ball_and_stop[1]
+    return served
 
 
 def _name(camera: int, mirror: int) -> str:
     return f"{'ab'[camera]}{mirror + 1:04d}"
 
 
-def _check_errors(
-    path: Path, pictures: list[PictureRow], plan: Plan, exported: ExportedDesign
-) -> None:
+def _check_errors(path: Path, said: Floats, plan: Plan, exported: ExportedDesign) -> None:
     """The balls must stand where the plan says: as far from each mirror's direction as it says."""
-    said = np.zeros(plan.ball.shape)
-    for one in pictures:
-        said[int(one.object_turn_deg != 0), int(one.mirror[1:]) - 1] = one.error_deg
     a, b = exported.reflectors
     u = np.stack([a.u, b.u * HALF_TURN])
     apex = rotated(plan.apex[plan.ball], plan.frame[0], plan.angle[plan.stop])

@@ -5,30 +5,30 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
 from tbcad.core.geometry.round_cones import smallest_sphere
-from tbcad.core.geometry.vectors import norm
+from tbcad.core.geometry.vectors import facet_vectors, norm
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.light.simulate.object_files.contents import (
     UNITS_MM,
     ObjectFile,
     ObjectPart,
     Up,
+    even,
     without_facets,
 )
 from tbcad.light.simulate.object_files.normals import (
     corner_normals,
-    facet_vectors,
     first_of_each,
     turned_outward,
     usable,
 )
 from tbcad.light.simulate.object_files.read import read_object_file
 from tbcad.light.simulate.scene.object import GREY, Reading, SceneObject, built_in_object
-from tbcad.types import Bytes, Floats, Ints, Progress
+from tbcad.types import Floats, Ints, Progress
 
 Paint = Literal["own", "pattern", "plain"]
 Unit = Literal["mm", "cm", "m", "in"]
@@ -57,17 +57,6 @@ class ObjectOptions:
     # the file's axis that points up; None: as the file or its format says, else z
     up: Up | None = None
     unit: Unit | None = None  # of the file; None: as the file or its format says, else mm
-
-    def __post_init__(self) -> None:
-        """Refuse what is none of these; InputError: it is not."""
-        for name, value, allowed in (
-            ("paint", self.paint, get_args(Paint)),
-            ("up", self.up, (None, *get_args(Up))),
-            ("unit", self.unit, (None, *get_args(Unit))),
-        ):
-            if value not in allowed:
-                names = ", ".join(str(one) for one in allowed if one)
-                raise InputError(f"{name} {value!r} is not known: allowed is {names}")
 
 
 def load_or_built_in(
@@ -129,9 +118,8 @@ class _Mesh:
     points: Floats  # as of SceneObject
     faces: Ints
     normals: Floats
-    part: Ints  # of each facet, (f,)
-    kept: Ints  # number of each facet in its part, (f,)
-    turned: Any  # whether its corners go the other way than in its part, (f,)
+    facet: Ints  # number of each facet among those of all parts, (f,)
+    turned: Any  # whether its corners go the other way than there, (f,)
 
     @classmethod
     def of(cls, path: Path, parts: Sequence[ObjectPart]) -> "_Mesh":
@@ -143,23 +131,19 @@ class _Mesh:
         given = np.concatenate([
             np.full_like(p.points, np.nan) if p.normals is None else p.normals for p in parts
         ])  # fmt: skip
-        part = np.repeat(np.arange(len(parts)), [len(p.faces) for p in parts])
-        kept = np.concatenate([np.arange(len(p.faces)) for p in parts])
-        shown = _shown(path, points, faces)
-        faces, part, kept = faces[shown], part[shown], kept[shown]
-        used, faces = np.unique(faces, return_inverse=True)
+        facet = _shown(path, points, faces)
+        used, faces = np.unique(faces[facet], return_inverse=True)
         points, given, faces = points[used], given[used], faces.reshape(-1, 3)
         turned = turned_outward(points, faces)
         faces = np.where(turned[:, None], faces[:, ::-1], faces)
         known = np.isfinite(given).all(axis=1, keepdims=True) & (norm(given) > 0)[:, None]
         normals = np.where(known, given, corner_normals(points, faces))
-        return cls(*usable(points, faces, normals), part, kept, turned)
+        return cls(*usable(points, faces, normals), facet, turned)
 
-    def corners(self, values: Floats, facets: Any) -> Floats:
-        """Values (k, 3, ...) at the corners of some facets of a part, as they go in the mesh."""
-        own = values[self.kept[facets]]
-        turned = self.turned[facets].reshape(-1, *[1] * (own.ndim - 1))
-        return np.asarray(np.where(turned, own[:, ::-1], own), dtype=np.float64)
+    def corners(self, values: Sequence[Floats]) -> Floats:
+        """Values (k, 3, n) of each part at the corners of its facets, as they go in the mesh."""
+        own = np.concatenate(values)[self.facet]
+        return np.asarray(np.where(self.turned[:, None, None], own[:, ::-1], own))
 
 
 def _check(path: Path, parts: Sequence[ObjectPart]) -> None:
@@ -192,7 +176,7 @@ def _shown(path: Path, points: Floats, faces: Ints) -> Ints:
     if np.ptp(corners.reshape(-1, 3), axis=0).max() == 0:
         raise InputError(f"{path} has no extent: all its points are one: name another")
     longest = norm(corners - np.roll(corners, 1, axis=1)).max(axis=1)
-    shown = np.flatnonzero(norm(facet_vectors(points, faces)) > LEAST_AREA * longest**2)
+    shown = np.flatnonzero(norm(facet_vectors(corners)) > LEAST_AREA * longest**2)
     if len(shown) == 0:
         raise InputError(f"{path} has no area: all its facets are lines or points: name another")
     return shown[first_of_each(faces[shown])]
@@ -239,47 +223,33 @@ def _painted(
         notes.append(f"{bare} of its {sum(len(p.faces) for p in found.parts)} facets have no "
                      "colour and are grey")  # fmt: skip
     text = ", ".join(sources[:4]) + (f" and {len(sources) - 4} more" if len(sources) > 4 else "")
-    return {"albedo": _albedo(mesh, found.parts, plain), "text": text,
-            **_textures(path, mesh, found.parts)}, notes  # fmt: skip
+    albedo = mesh.corners([_shares(part) for part in found.parts])
+    return {"albedo": albedo, "text": text, **_textures(path, mesh, found.parts)}, notes
 
 
-def _albedo(mesh: _Mesh, parts: Sequence[ObjectPart], plain: Floats) -> Floats:
-    albedo = plain.copy()
-    for k, part in enumerate(parts):
-        facets = np.flatnonzero(mesh.part == k)
-        if part.colours is not None:
-            albedo[facets] = mesh.corners(part.colours, facets)
-        elif part.picture is not None:
-            albedo[facets] = 1.0
-    return albedo
+def _shares(part: ObjectPart) -> Floats:
+    """Colours (f, 3, 3) of a part, or what its picture is multiplied by, or grey."""
+    if part.colours is not None:
+        return part.colours
+    return even((GREY if part.picture is None else 1.0,) * 3, len(part.faces))
 
 
 def _textures(path: Path, mesh: _Mesh, parts: Sequence[ObjectPart]) -> dict[str, Any]:
-    """Fields uv, texture and tiles: each picture once, one below the other."""
+    """Fields uv, texture and tiles: each picture once, one below the other, as wide as the widest.
+
+    InputError: they are too large.
+    """
     pictures = list({id(p.picture): p.picture for p in parts if p.picture is not None}.values())
     if not pictures:
         return {}
-    texture, first = _stacked(path, pictures)
-    tile = {id(picture): (row, *picture.shape[:2])
-            for picture, row in zip(pictures, first, strict=True)}  # fmt: skip
-    uv, tiles = np.zeros((len(mesh.faces), 3, 2)), np.zeros((len(mesh.faces), 3), dtype=np.int64)
-    for k, part in enumerate(parts):
-        if part.picture is not None and part.uv is not None:
-            facets = np.flatnonzero(mesh.part == k)
-            uv[facets] = mesh.corners(part.uv, facets)
-            tiles[facets] = tile[id(part.picture)]
-    return {"uv": uv, "texture": texture, "tiles": tiles}
-
-
-def _stacked(path: Path, pictures: Sequence[Bytes]) -> tuple[Bytes, list[int]]:
-    """Pictures below each other, as wide as the widest, and their first rows."""
-    if len(pictures) == 1:
-        return pictures[0], [0]
-    heights, width = [len(picture) for picture in pictures], max(p.shape[1] for p in pictures)
-    if 3 * sum(heights) * width > MAX_TEXTURE_BYTES:
+    height, width = sum(map(len, pictures)), max(picture.shape[1] for picture in pictures)
+    if len(pictures) > 1 and 3 * height * width > MAX_TEXTURE_BYTES:
         raise InputError(f"{path} has textures of over 2 GiB in all: reduce them")
-    texture = np.zeros((sum(heights), width, 3), dtype=np.uint8)
-    first = np.cumsum([0, *heights[:-1]]).tolist()
-    for picture, row in zip(pictures, first, strict=True):
+    texture, tile, row = np.zeros((height, width, 3), dtype=np.uint8), {id(None): (0, 0, 0)}, 0
+    for picture in pictures:
         texture[row : row + len(picture), : picture.shape[1]] = picture
-    return texture, first
+        tile[id(picture)] = row, *picture.shape[:2]
+        row += len(picture)
+    uv = [np.zeros((len(p.faces), 3, 2)) if p.uv is None else p.uv for p in parts]
+    tiles = np.repeat([tile[id(p.picture)] for p in parts], [len(p.faces) for p in parts], axis=0)
+    return {"uv": mesh.corners(uv), "texture": texture, "tiles": tiles[mesh.facet]}

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.core.geometry.vectors import dot, unit
+from tbcad.core.geometry.vectors import dot, facet_vectors, unit
 from tbcad.light.simulate.parallel import over_chunks
 from tbcad.light.simulate.scene.lamps import PointLights, Spots, lamp_light
 from tbcad.light.simulate.scene.object import SceneObject, pattern
@@ -102,8 +102,7 @@ class SurfaceHits:
 
     def facet_normals(self, subject: SceneObject) -> Floats:
         """Unit normals (k, 3) of the facets, on the side that the rays meet."""
-        a, b, c = (subject.points[subject.faces[self.facet, k]] for k in range(3))
-        across = unit(np.cross(b - a, c - a))
+        across = unit(facet_vectors(subject.points[subject.faces[self.facet]]))
         return np.where(dot(across, self.direction)[:, None] > 0, -across, across)
 
     def behind(self, subject: SceneObject, facet_normals: Floats) -> Bools:

@@ -7,6 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.common.compiled import compiled
+from tbcad.core.geometry.loop_vectors import (
+    Vector,
+    dot,
+    minus,
+    plus_scaled,
+    reflect,
+    scaled,
+    unit,
+    vector,
+)
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
@@ -89,11 +99,8 @@ def _toward(columns: Floats, lines: Floats, depth: float, aside: Floats) -> Floa
     result = np.empty((len(lines), len(columns), 3))
     for y in range(len(lines)):
         for x in range(len(columns)):
-            a = (columns[x, 0] + lines[y, 0]) * depth - aside[0]
-            b = (columns[x, 1] + lines[y, 1]) * depth - aside[1]
-            c = (columns[x, 2] + lines[y, 2]) * depth - aside[2]
-            length = np.sqrt(a * a + b * b + c * c)
-            result[y, x, 0], result[y, x, 1], result[y, x, 2] = a / length, b / length, c / length
+            seen = scaled(depth, plus_scaled(vector(columns[x]), 1.0, vector(lines[y])))
+            result[y, x, 0], result[y, x, 1], result[y, x, 2] = unit(minus(seen, vector(aside)))
     return result
 
 
@@ -151,27 +158,23 @@ def meets_sphere(origin: Floats, direction: Floats, radius: float) -> Bools:
     """Which rays (n, 3) along unit directions meet the sphere of a radius about (0, 0, 0), (n,)."""
     meets = np.zeros(len(origin), dtype=np.bool_)
     for i in range(len(origin)):
-        along = squared = length = 0.0
-        for j in range(3):
-            along += origin[i, j] * direction[i, j]
-            squared += origin[i, j] * origin[i, j]
-            length += direction[i, j] * direction[i, j]
-        inside = squared <= radius * radius
-        ahead = along < 0 or inside
-        meets[i] = length > 0 and ahead and squared - along * along <= radius * radius
+        start, way = vector(origin[i]), vector(direction[i])
+        along, squared = dot(start, way), dot(start, start)
+        ahead = along < 0 or squared <= radius * radius
+        meets[i] = dot(way, way) > 0 and ahead and squared - along * along <= radius * radius
     return meets
 
 
 @compiled
-def _entry(mirror: Floats, dx: float, dy: float, dz: float) -> float:
+def _entry(mirror: Floats, way: Vector) -> float:
     """Where a ray from the pinhole enters a mirror (11,), in lengths of its direction.
 
     On the ray x = pinhole + t d the surface's f (core.optics.surfaces) is k/2 d.d t^2 + g.d t + h;
     the ray enters at the smaller root, in the form that loses no digits and holds for planes.
     Infinite where it does not enter.
     """
-    slope = mirror[8] * dx + mirror[9] * dy + mirror[10] * dz
-    root = slope * slope - 2 * mirror[6] * mirror[7] * (dx * dx + dy * dy + dz * dz)
+    slope = dot(vector(mirror, 8), way)
+    root = slope * slope - 2 * mirror[6] * mirror[7] * dot(way, way)
     if slope >= 0 or root < 0:
         return np.inf
     t: float = 2 * mirror[7] / (np.sqrt(root) - slope)
@@ -179,13 +182,11 @@ def _entry(mirror: Floats, dx: float, dy: float, dz: float) -> float:
 
 
 @compiled
-def within_walls(walls: Floats, point: tuple[float, float, float]) -> bool:
+def within_walls(walls: Floats, point: Vector) -> bool:
     """Whether a point lies on the inner side of all walls (k, 6)."""
     for wall in walls:
-        value = 0.0
-        for j in range(3):
-            value += (point[j] - wall[j]) * wall[3 + j]
-        if value < 0:
+        inward = vector(wall, 3)
+        if dot(minus(point, vector(wall)), inward) < 0:
             return False
     return True
 
@@ -201,25 +202,20 @@ def _first_mirror(
     edges: tuple[float, float],
 ) -> MirrorNumbers:
     """The mirror that each ray of the band enters first, from 1, out of those near it."""
-    (side, foot), (first_wall, every_wall) = edges, walls
+    (side, foot), (first_wall, every_wall), start = edges, walls, vector(pinhole)
     height, width = direction.shape[0], direction.shape[1]
     mirror = np.zeros((height, width), dtype=np.int32)
     reach = np.full((height, width), np.inf)
     for i in near:
+        own = every_wall[first_wall[i] : first_wall[i + 1]]
         for y in range(max(boxes[i, 2], 0), min(boxes[i, 3], height)):
             for x in range(boxes[i, 0], boxes[i, 1]):
-                dx, dy, dz = direction[y, x, 0], direction[y, x, 1], direction[y, x, 2]
-                t = _entry(table[i], dx, dy, dz)
-                if (
-                    0 < t < reach[y, x]
-                    and side * (pinhole[0] + t * dx) >= 0
-                    and pinhole[2] + t * dz >= foot
-                    and within_walls(
-                        every_wall[first_wall[i] : first_wall[i + 1]],
-                        (pinhole[0] + t * dx, pinhole[1] + t * dy, pinhole[2] + t * dz),
-                    )
-                ):
-                    reach[y, x], mirror[y, x] = t, i + 1
+                way = vector(direction[y, x])
+                t = _entry(table[i], way)
+                if 0 < t < reach[y, x]:
+                    point = plus_scaled(start, t, way)
+                    if side * point[0] >= 0 and point[2] >= foot and within_walls(own, point):
+                        reach[y, x], mirror[y, x] = t, i + 1
     return mirror
 
 
@@ -236,11 +232,9 @@ def _inside_neighbours(
             for j in neighbours[mirror[y, x] - 1]:
                 if j < 0:
                     break
-                value = 0.0
-                for axis in range(3):
-                    offset = point[y, x, axis] - table[j, axis]
-                    value += (table[j, 3 + axis] + table[j, 6] / 2 * offset) * offset
-                if value < -ROUNDING_MM:
+                offset = minus(vector(point[y, x]), vector(table[j]))
+                gradient = plus_scaled(vector(table[j], 3), table[j, 6] / 2, offset)
+                if dot(gradient, offset) < -ROUNDING_MM:
                     inside[y, x] = True
     return inside
 
@@ -254,26 +248,18 @@ def _reflect(
     origin: Floats,
     reflected: Floats,
 ) -> None:
-    """Fill in points on the numbered mirrors and unit directions after them.
-
-    The law of tbcad.core.optics.reflection, compiled: it is the inner loop of every photograph.
-    """
-    normal = np.empty(3)
+    """Fill in points on the numbered mirrors and unit directions after them."""
+    start = vector(pinhole)
     for y in range(direction.shape[0]):
         for x in range(direction.shape[1]):
             if mirror[y, x] == 0:
                 continue
-            row = table[mirror[y, x] - 1]
-            dx, dy, dz = direction[y, x, 0], direction[y, x, 1], direction[y, x, 2]
-            length = np.sqrt(dx * dx + dy * dy + dz * dz)
-            t, slope = _entry(row, dx / length, dy / length, dz / length), 0.0
-            for j in range(3):
-                d = direction[y, x, j] / length
-                origin[y, x, j] = pinhole[j] + t * d
-                normal[j] = row[3 + j] + row[6] * (origin[y, x, j] - row[j])
-                slope += d * normal[j]
-            for j in range(3):
-                reflected[y, x, j] = direction[y, x, j] / length - 2 * slope * normal[j]
+            row, way = table[mirror[y, x] - 1], unit(vector(direction[y, x]))
+            point = plus_scaled(start, _entry(row, way), way)
+            normal = plus_scaled(vector(row, 3), row[6], minus(point, vector(row)))
+            origin[y, x, 0], origin[y, x, 1], origin[y, x, 2] = point
+            out = reflect(way, normal)
+            reflected[y, x, 0], reflected[y, x, 1], reflected[y, x, 2] = out
 
 
 def camera_around_object(

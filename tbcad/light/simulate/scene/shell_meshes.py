@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad.cad.formats.checked_files import REBUILD
-from tbcad.core.geometry.vectors import unit
+from tbcad.core.geometry.vectors import dot, facet_vectors, norm, perpendicular_axes
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.ray_casting import embree_scene
@@ -98,7 +98,8 @@ def fitted_surfaces(nominal: Surfaces, corners: Floats, owner: Ints) -> Surfaces
     """
     owned = owner >= 0
     i = np.repeat(owner[owned], 3)
-    frames = _frames(nominal.normal)
+    axes = perpendicular_axes(nominal.normal)
+    frames = np.concatenate([axes, nominal.normal[:, None]], axis=1)
     local = np.einsum("nkx,nx->nk", frames[i], corners[owned].reshape(-1, 3) - nominal.apex[i])
     terms = np.column_stack([np.ones(len(i)), local[:, :2], -(local**2).sum(axis=1) / 2])
     products = np.einsum("nj,nk->njk", terms, np.column_stack([terms, local[:, 2]]))
@@ -113,13 +114,6 @@ def fitted_surfaces(nominal: Surfaces, corners: Floats, owner: Ints) -> Surfaces
     back = np.swapaxes(frames, 1, 2)
     apex = nominal.apex + np.einsum("mxk,mk->mx", back, foot)
     return Surfaces(apex, np.einsum("mxk,mk->mx", back, normal), k / size)
-
-
-def _frames(normal: Floats) -> Floats:
-    """Rows (m, 3, 3): two unit vectors across each normal (m, 3), and the normal."""
-    shortest = np.eye(3)[np.abs(normal).argmin(axis=1)]
-    across = unit(np.cross(normal, shortest))
-    return np.stack([across, np.cross(normal, across), normal], axis=1)
 
 
 def read_facets(path: Path) -> Floats:
@@ -159,7 +153,5 @@ def facet_owners(bare: Surfaces, corners: Floats) -> Ints:
 
 def _along(bare: Surfaces, corners: Floats, owner: Ints) -> NDArray[np.bool_]:
     """Which facets (f, 3, 3) lie along their mirror: a wall's corners may all be on its rim."""
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal = bare.gradient(owner, corners.mean(axis=1))
-    size = np.linalg.norm(area, axis=1) * np.linalg.norm(normal, axis=1)
-    return np.asarray(np.abs((area * normal).sum(axis=1)) > MIN_FACET_COSINE * size)
+    area, normal = facet_vectors(corners), bare.gradient(owner, corners.mean(axis=1))
+    return np.asarray(np.abs(dot(area, normal)) > MIN_FACET_COSINE * norm(area) * norm(normal))

@@ -21,7 +21,6 @@ from tbcad.light.simulate.object_files.threemf import read_3mf
 
 # sRGB's code of light 0.5 and 0.2, by the standard's table.
 HALF, FIFTH = 0.735357, 0.484529
-NAMESPACE = "http://schemas.openxmlformats.org/package/2006"
 CORE = "http://schemas.microsoft.com/3dmanufacturing"
 MESH = (
     '<mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="2" y="0" z="0"/>'
@@ -204,26 +203,19 @@ def mesh(properties: str = "") -> str:
 
 
 def written(path: Path, resources: str, build: str) -> Path:
-    model = (
+    """A file of tbcad's own writer, with another model in it."""
+    write_3mf(path, "box", Mesh(np.eye(4, 3), np.array([[0, 1, 2]])))
+    with zipfile.ZipFile(path) as packed:
+        files = {name: packed.read(name) for name in packed.namelist()}
+    (model,) = (name for name in files if name.endswith(".model"))
+    text = (
         f'<?xml version="1.0"?><model unit="inch" xmlns="{CORE}/core/2015/02" '
         f'xmlns:m="{CORE}/material/2015/02"><resources>{resources}</resources>'
         f"<build>{build}</build></model>"
     )
-    kinds = (
-        f'<Types xmlns="{NAMESPACE}/content-types"><Default Extension="rels" '
-        'ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default '
-        'Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>'
-        "</Types>"
-    )
-    relations = (
-        f'<Relationships xmlns="{NAMESPACE}/relationships"><Relationship Id="r" '
-        f'Target="/3D/a.model" Type="{CORE}/2013/01/3dmodel"/>'
-        "</Relationships>"
-    )
     with zipfile.ZipFile(path, "w") as packed:
-        packed.writestr("[Content_Types].xml", kinds)
-        packed.writestr("_rels/.rels", relations)
-        packed.writestr("3D/a.model", model)
+        for name, data in (files | {model: text.encode()}).items():
+            packed.writestr(name, data)
     return path
 
 

@@ -13,6 +13,7 @@ from tbcad.light.simulate.object_files.contents import ObjectFile, ObjectPart
 from tbcad.light.simulate.object_files.read import read_object_file
 
 CORNERS = ("-1 -1 0", "1 -1 0", "1 1 0", "-1 1 0")
+QUAD = "4 0 1 2 3"
 ORANGE = [1.0, 128 / 255, 0.0]
 Write = Callable[[str, str], Path]
 
@@ -26,7 +27,7 @@ def write(tmp_path: Path) -> Write:
     return _write
 
 
-def ply(properties: str = "", values: str = "", faces: tuple[str, ...] = ("4 0 1 2 3",),
+def ply(properties: str = "", values: str = "", faces: tuple[str, ...] = (QUAD,),
         of_face: str = "", comment: str = "") -> str:  # fmt: skip
     """A square with more properties of its corners."""
     names = [f"property {one}" for one in properties.split(",") if one]
@@ -54,17 +55,20 @@ def area(part: ObjectPart) -> float:
 
 
 @pytest.mark.parametrize(
-    ("properties", "values"),
+    ("name", "text"),
     [
-        ("uchar red,uchar green,uchar blue", "255 128 0"),
-        ("uchar diffuse_red,uchar diffuse_green,uchar diffuse_blue", "255 128 0"),
-        ("ushort red,ushort green,ushort blue", "65535 32896 0"),
-        ("float red,float green,float blue", f"1 {128 / 255} 0"),
-        ("float red,float green,float blue", "255 128 0"),
+        ("a.ply", ply("uchar red,uchar green,uchar blue", "255 128 0")),
+        ("a.ply", ply("uchar diffuse_red,uchar diffuse_green,uchar diffuse_blue", "255 128 0")),
+        ("a.ply", ply("ushort red,ushort green,ushort blue", "65535 32896 0")),
+        ("a.ply", ply("float red,float green,float blue", f"1 {128 / 255} 0")),
+        ("a.ply", ply("float red,float green,float blue", "255 128 0")),
+        ("a.off", "COFF\n4 1 0\n" + "".join(f"{c} 255 128 0 255\n" for c in CORNERS) + QUAD),
+        ("a.off", "OFF 4 1 0\n" + "\n".join(CORNERS) + f"\n{QUAD} 1.0 {128 / 255} 0.0\n"),
+        ("a.obj", "".join(f"v {c} 255 128 0\n" for c in CORNERS) + "f 1 2 3 4\n"),
     ],
 )
-def test_colours_of_all_types(write: Write, properties: str, values: str) -> None:
-    part = only(read_object_file(write("a.ply", ply(properties, values))))
+def test_colours_of_all_types(write: Write, name: str, text: str) -> None:
+    part = only(read_object_file(write(name, text)))
     assert part.colours is not None
     assert part.colours[1, 2] == pytest.approx(ORANGE, abs=1e-6)
 
@@ -180,17 +184,6 @@ def test_hollow_polygons_keep_their_area(write: Write) -> None:
         assert area(part) == pytest.approx(5)
         sides = trimesh.Trimesh(part.points, part.faces, process=False).face_normals[:, 2]
         assert (sides > 0).all()
-
-
-def test_off_with_colours(write: Write) -> None:
-    rows = "\n".join(f"{corner} 255 128 0 255" for corner in CORNERS)
-    part = only(read_object_file(write("a.off", f"COFF\n4 1 0\n{rows}\n4 0 1 2 3\n")))
-    assert part.colours is not None
-    assert part.colours[0, 0] == pytest.approx(ORANGE)
-    rows = "\n".join(CORNERS)
-    part = only(read_object_file(write("b.off", f"OFF 4 1 0\n{rows}\n4 0 1 2 3 1.0 0.5 0.0\n")))
-    assert part.colours is not None
-    assert part.colours[1, 1].tolist() == [1, 0.5, 0]
 
 
 @pytest.mark.parametrize(

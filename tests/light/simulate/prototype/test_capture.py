@@ -200,19 +200,6 @@ class TestMerged:
             off = np.abs(planes["colour"].astype(int) - picture).max(axis=2)
             assert (off[whole] > 1).mean() < 5e-4
 
-    def test_light_obeys_the_law_of_reflection(self, merged: LightField, runs: Runs) -> None:
-        """The ray in and the ray out have the ball's normal for their bisector."""
-        for run in runs:
-            frame = merged.frames[run.reflector.camera_id]
-            mirror = frame.planes["mirror"].astype(int)
-            on = mirror > 0
-            ball = run.balls[run.stop[mirror[on] - 1], run.ball[mirror[on] - 1]]
-            origin = frame.planes["origin"][on].astype(float)
-            both_ways = unit(run.camera.pinhole - origin) + frame.planes["direction"][on]
-            assert np.abs(unit(both_ways) - unit(origin - ball[:, :3])).max() < 1e-4
-            assert np.abs(norm(origin - ball[:, :3]) - ball[:, 3]).max() < 1e-4
-            assert not frame.planes["origin"][~on].any()
-
     def test_share_of_rays_kept_is_that_of_the_layout(
         self, merged: LightField, layout: PrototypeLayout, cameras: tuple[Reflector, Reflector]
     ) -> None:
@@ -263,18 +250,6 @@ def capture_rays(planes: dict[str, np.ndarray]) -> np.ndarray:
     return near & (planes["mirror"] > 0) & ((origin * direction).sum(axis=2) < 0)
 
 
-@pytest.fixture
-def broken_export(export_folder: Path, tmp_path: Path) -> Path:
-    """A copy, to be broken."""
-    return Path(shutil.copytree(export_folder, tmp_path / "broken"))
-
-
-def check_refusal(folder: Path, message: str) -> None:
-    with pytest.raises(InputError, match=message) as caught:
-        read_plan(read_export(folder))
-    assert "\n" not in str(caught.value)
-
-
 class TestReading:
     def test_plan_round_trip(self, export_folder: Path, layout: PrototypeLayout) -> None:
         found, wanted = read_plan(read_export(export_folder)), plan_of(layout)
@@ -294,13 +269,10 @@ class TestReading:
             (PLAN, lambda t: t[3].update(mirror="a9999"), "allowed .* is a0001 to a0103"),
             (PLAN, lambda t: t[3].update(ball="6"), "names ball 6, allowed is 1 to 5"),
             (PLAN, lambda t: t[3].update(object_turn_deg="90"), "object_turn_deg 90"),
-            (PLAN, lambda t: t[3].update(base_angle_deg="nan"), "4 base_angle_deg: "),
             (PLAN, lambda t: t[0].update(base_angle_deg="3"), "stop 1 has two base angles"),
             (PLAN, lambda t: raised(t, "stop", 1), "not numbered from 1"),
             (PLAN, lambda t: raised(t, "base_angle_deg", 1.0, -1), "do not rise from stop to stop"),
             (PLAN, lambda t: raised(t, "base_angle_deg", 0.5), "but its ball is"),
-            (RECORD, lambda t: t.update(schema="tbcad-prototype/1"), "reads 'tbcad-prototype/2'"),
-            (RECORD, lambda t: t.update(picture="bent"), "picture: "),
             (RECORD, lambda t: t["frame"].update(zero=[1, 0, 0]), "not square"),
             (RECORD, lambda t: t["frame"].update(third=[0, 1, 0]), "right-handed"),
             (RECORD, lambda t: t.update(frame=FRAME), "does not point"),
@@ -311,18 +283,19 @@ class TestReading:
         ],
     )
     def test_refused(
-        self, broken_export: Path, name: str, change: Callable[[Any], object], message: str
+        self,
+        export_folder: Path,
+        tmp_path: Path,
+        name: str,
+        change: Callable[[Any], object],
+        message: str,
     ) -> None:
+        folder = Path(shutil.copytree(export_folder, tmp_path / "broken"))
         edit = edit_json if name.endswith(".json") else edit_csv
-        edit(broken_export / name, change)
-        check_refusal(broken_export, message)
-
-    @pytest.mark.parametrize("name", ["prototype.json", "balls.csv", "rotation_plan.csv"])
-    def test_files_that_are_not_there_or_no_text(self, broken_export: Path, name: str) -> None:
-        (broken_export / name).write_bytes(b"\xff\xfe\x00")
-        check_refusal(broken_export, f"{name} cannot be read")
-        (broken_export / name).unlink()
-        check_refusal(broken_export, f"{name} is not there")
+        edit(folder / name, change)
+        with pytest.raises(InputError, match=message) as caught:
+            read_plan(read_export(folder))
+        assert "\n" not in str(caught.value)
 
     def test_one_camera_that_cannot_take_both_halves(self, export_folder: Path) -> None:
         exported = read_export(export_folder)

@@ -7,10 +7,7 @@ import pytest
 
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
-from tbcad.light.simulate.capture.files import read_object, write_object
-from tbcad.light.simulate.scene.lamps import RectangularLamps, irradiance, lit_by, read_lamps
-from tbcad.light.simulate.scene.object import built_in_object
-from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.lamps import RectangularLamps, irradiance, read_lamps
 from tests.exported_files import edit_json
 from tests.prototype_records import LAMP_SECTION, write_prototype
 
@@ -46,17 +43,6 @@ def test_a_half_turn_leaves_the_light_as_it_was() -> None:
     quarter = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
     other = irradiance(LAMPS, points @ quarter, normals @ quarter)
     assert np.abs(other - before).max() > 0.2 * before.max()
-
-
-def test_a_lit_object_keeps_its_light_in_a_capture(tmp_path: Path) -> None:
-    plain = built_in_object(60.0)
-    lit = lit_by(LAMPS, plain)
-    scene = prepared_scene(lit)
-    assert scene.shade.max() == 1.0
-    assert not np.allclose(scene.shade, prepared_scene(plain).shade)
-    write_object(tmp_path / "object.npz", lit)
-    again = read_object(tmp_path)
-    assert np.array_equal(prepared_scene(again).shade, scene.shade)
 
 
 def test_lamps_of_a_record(tmp_path: Path) -> None:

@@ -39,23 +39,6 @@ def from_above(subject: SceneObject, x: float, y: float) -> RayHits:
     return cast_rays(scene, np.array([[x, y, 100.0]]), np.array([[0.0, 0.0, -1.0]]))
 
 
-def test_texture_is_shown(tmp_path: Path) -> None:
-    """At the middle of a texel it is that texel."""
-    picture = np.random.default_rng(4).integers(40, 250, (8, 16, 3), dtype=np.uint8)
-    mesh = trimesh.Trimesh(
-        [[-10, -10, 0], [10, -10, 0], [10, 10, 0], [-10, 10, 0]], [[0, 1, 2], [0, 2, 3]]
-    )
-    corners = [[0, 0], [1, 0], [1, 1], [0, 1]]
-    mesh.visual = trimesh.visual.TextureVisuals(uv=corners, image=Image.fromarray(picture))
-    mesh.export(tmp_path / "square.glb")
-    subject = load_object(tmp_path / "square.glb", CAPTURE_MM, ObjectOptions(up="z", unit="mm"))
-    assert subject.texture is not None
-    for column, row in ((3, 1), (12, 6)):
-        x, y = (column + 0.5) / 16 * 20 - 10, 10 - (row + 0.5) / 8 * 20
-        colour, texel = from_above(subject, x, y).colour[0], subject.texture[row, column] / 255
-        assert colour / colour.max() == pytest.approx(texel / texel.max(), abs=0.01)
-
-
 def test_paint(tmp_path: Path) -> None:
     mesh = box()
     mesh.visual.vertex_colors = np.full((8, 4), 255, dtype=np.uint8)
@@ -106,13 +89,14 @@ def test_built_in_object_is_a_closed_body_of_many_colours() -> None:
 
 
 def test_object_file_round_trip(tmp_path: Path) -> None:
-    subject = built_in_object(CAPTURE_MM)
+    lamps = RectangularLamps(np.array([[200.0, 0, 0]]), np.array([[-1.0, 0, 0]]), 10, 10, 100)
+    subject = lit_by(lamps, built_in_object(CAPTURE_MM))
+    assert prepared_scene(subject).shade.max() == 1.0
     write_object(tmp_path / "object.npz", subject)
     first = (tmp_path / "object.npz").read_bytes()
     back = read_object(tmp_path)
-    assert back.name == subject.name
-    assert np.array_equal(back.points, subject.points)
-    assert np.array_equal(back.albedo, subject.albedo)
+    for name, value in vars(subject).items():
+        assert np.array_equal(getattr(back, name), value), name
     write_object(tmp_path / "object.npz", back)
     assert (tmp_path / "object.npz").read_bytes() == first
 
@@ -126,6 +110,8 @@ def test_damaged_objects(tmp_path: Path) -> None:
     strange = {
         "faces": arrays["faces"] + len(arrays["points"]),
         "normals": arrays["normals"][:-1],
+        "light": arrays["points"][:, 0],
+        "uv": np.zeros((len(arrays["faces"]), 3, 2)),
         "points": np.array([{}], dtype=object),
     }
     for name in (*strange, "cut"):
@@ -273,26 +259,34 @@ def test_too_large_or_small_names_the_unit_that_fits(tmp_path: Path) -> None:
 
 
 def test_several_pictures_and_colours(tmp_path: Path) -> None:
-    """Two pictures of other sizes, which repeat, and a plain colour: also read back."""
-    Image.new("RGB", (4, 2), (255, 0, 0)).save(tmp_path / "red.png")
+    """A picture whose texels are seen at their middles, one that repeats, and a plain colour."""
+    picture = np.random.default_rng(4).integers(0, 256, (8, 16, 3), dtype=np.uint8)
+    Image.fromarray(picture).save(tmp_path / "many.png")
     Image.new("RGB", (2, 8), (0, 255, 0)).save(tmp_path / "green.png")
     (tmp_path / "a.mtl").write_text(
-        "newmtl r\nmap_Kd red.png\nnewmtl g\nmap_Kd green.png\nnewmtl b\nKd 0 0 1\n"
+        "newmtl m\nmap_Kd many.png\nnewmtl g\nmap_Kd green.png\nnewmtl b\nKd 0 0 1\n"
     )
     strips = "".join(f"v {x} {y} 0\n" for x in (-15, -5, 5, 15) for y in (-5, 5))
     faces = "".join(
-        f"usemtl {name}\nf {2 * k + 1}/1 {2 * k + 3}/2 {2 * k + 4}/3 {2 * k + 2}/4\n"
-        for k, name in enumerate("rgb")
+        f"usemtl {name}\nf {2 * k + 1}/{j} {2 * k + 3}/{j + 1} {2 * k + 4}/{j + 2} "
+        f"{2 * k + 2}/{j + 3}\n"
+        for name, k, j in (("m", 0, 1), ("g", 1, 5), ("b", 2, 5))
     )
-    (tmp_path / "a.obj").write_text(
-        f"mtllib a.mtl\n{strips}vt -3 -3\nvt 3 -3\nvt 3 3\nvt -3 3\n{faces}"
+    places = "".join(
+        f"vt {x} {y}\n"
+        for low, high in ((0, 1), (-3, 3))
+        for x, y in ((low, low), (high, low), (high, high), (low, high))
     )
+    (tmp_path / "a.obj").write_text(f"mtllib a.mtl\n{strips}{places}{faces}")
     subject = load_object(tmp_path / "a.obj", CAPTURE_MM)
     write_object(tmp_path / "object.npz", subject)
-    start = np.array([[x, 1.0, 50.0] for x in (-10.0, 0.0, 10.0)])
+    texels = [(3, 1), (12, 6)]  # columns and rows
+    at = [((x + 0.5) / 16 * 10 - 15, 5 - (y + 0.5) / 8 * 10) for x, y in texels]
+    start = np.array([[x, y, 50.0] for x, y in (*at, (0.0, 1.0), (10.0, 1.0))])
+    wanted = np.vstack([[picture[y, x] / 255 for x, y in texels], np.eye(3)[1:]])
     for one in (subject, read_object(tmp_path)):
-        hits = surface_hits(prepared_scene(one), start, np.tile([0.0, 0, -1], (3, 1)))
-        assert hits.albedo(one) == pytest.approx(np.eye(3), abs=1e-6)
+        hits = surface_hits(prepared_scene(one), start, np.tile([0.0, 0, -1], (4, 1)))
+        assert hits.albedo(one) == pytest.approx(wanted, abs=1e-6)
 
 
 def test_facets_without_colours_beside_others_are_noted(tmp_path: Path) -> None:
@@ -302,26 +296,3 @@ def test_facets_without_colours_beside_others_are_noted(tmp_path: Path) -> None:
     )
     with pytest.warns(PlausibilityWarning, match="1 of its 2 facets have no colour"):
         load_object(tmp_path / "a.obj", CAPTURE_MM)
-
-
-def test_objects_of_older_captures_are_read(tmp_path: Path) -> None:
-    """Their one texture was not multiplied, and light was of one side."""
-    arrays = {
-        "name": "old", "points": np.eye(3), "faces": [[0, 1, 2]], "normals": np.eye(3),
-        "albedo": np.full((1, 3, 3), 0.8), "uv": np.zeros((1, 3, 2)),
-        "texture": np.full((2, 4, 3), 51, dtype=np.uint8), "patterned": False,
-        "light": np.array([0.5, 0.6, 0.7]),
-    }  # fmt: skip
-    np.savez(tmp_path / "object.npz", **arrays)
-    subject = read_object(tmp_path)
-    assert subject.light is not None
-    assert subject.light.tolist() == [[0.5, 0.5], [0.6, 0.6], [0.7, 0.7]]
-    inward = -unit(np.ones((1, 3)))
-    hits = surface_hits(prepared_scene(subject), -5 * inward, inward)
-    assert hits.albedo(subject)[0] == pytest.approx([0.2] * 3)
-
-
-def test_options_out_of_their_range() -> None:
-    for wrong in ({"unit": "furlong"}, {"up": "x"}, {"paint": "blue"}):
-        with pytest.raises(InputError, match="is not known: allowed is"):
-            ObjectOptions(**wrong)  # type: ignore[arg-type]
