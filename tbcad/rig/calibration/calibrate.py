@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import diags_array
 
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
@@ -13,11 +14,17 @@ from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.run import Frame, Geometry
 from tbcad.records.tables import StopRow
 from tbcad.rig.calibration.detection.detection import Detection
-from tbcad.rig.calibration.estimate.parameters import Block, Prior
+from tbcad.rig.calibration.estimate.parameters import Of, Prior
 from tbcad.rig.calibration.estimate.solve import Estimate, estimate
 from tbcad.rig.calibration.intrinsics.lens import CalibratedLens
 from tbcad.rig.calibration.priors import Measured, prototype_prior, shell_prior
-from tbcad.rig.calibration.uncertainty import RayUncertainty, ray_slopes, ray_uncertainty
+from tbcad.rig.calibration.uncertainty import (
+    FIGURES,
+    PLACES,
+    RayUncertainty,
+    ray_slopes,
+    ray_uncertainty,
+)
 from tbcad.rig.machine.designed import designed_prototype, is_cap
 from tbcad.rig.machine.machine import Highlights, Machine
 from tbcad.rig.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
@@ -181,26 +188,19 @@ def _compared(
     progress(f"halves with {by} apart")
     one, other = (estimate(found.prior, _subset(found, part), start=found.values) for part in parts)
     slopes, _ = ray_slopes(found.prior, found.values, *rays)
-    slopes = slopes[:, _static(found)]
-    inverses = [np.linalg.inv(half.information.toarray()) for half in (one, other)]
-    both = inverses[0] @ inverses[1]
-    spread = (inverses[0] + inverses[1] - both - both.T)[np.ix_(_static(found), _static(found))]
-    difference = slopes @ (one.values - other.values)[_static(found)]
-    places = slopes.toarray().reshape(-1, 4, slopes.shape[1])[:, :2]
-    expected = np.einsum("mdq,qr,mdr->", places, spread, places, optimize=True)
-    squares = difference.reshape(-1, 4)[:, :2] ** 2
-    count = len(squares)
+    # Parameters of single frames are left out: a half sees every other frame.
+    static = diags_array((~found.prior.is_of(Of.FRAME)).astype(np.float64))
+    places = slopes[np.arange(slopes.shape[0]) % FIGURES < PLACES] @ static
+    spreads = [places @ half.covariance for half in (one, other)]
+    own = sum(float(places.multiply(spread).sum()) for spread in spreads)
+    expected = own - 2 * float((spreads[0] * spreads[1]).sum())
+    difference, count = places @ (one.values - other.values), len(rays[0])
     return HalvesRecord(
         apart=by,
         highlights=(len(one.highlights), len(other.highlights)),
-        found_mm=math.sqrt(float(squares.sum()) / count),
-        expected_mm=math.sqrt(float(expected) / count),
+        found_mm=math.sqrt(float(difference @ difference) / count),
+        expected_mm=math.sqrt(expected / count),
     )
-
-
-def _static(found: Estimate) -> Ints:
-    """Free parameters that are not of single frames, of which a half sees every other one."""
-    return np.flatnonzero(~found.prior.is_of(Block.ANGLES, Block.RUNOUT))
 
 
 def _subset(found: Estimate, part: Bools) -> Highlights:

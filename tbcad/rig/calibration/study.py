@@ -7,7 +7,6 @@ of the whole machine, nothing known but by the process.
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
 
 from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.geometry.vectors import unit
@@ -16,7 +15,7 @@ from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.stage.leds import hidden_by_object
 from tbcad.rig.calibration.calibrate import Setup, prepared_setup, ray_places
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Block, Covariance, Prior, covariance
+from tbcad.rig.calibration.estimate.parameters import Block, Prior, prior_of
 from tbcad.rig.calibration.led_layout import (
     FREE,
     PRIOR_MM,
@@ -104,13 +103,8 @@ def _case(layout: Layout, prior: str) -> Record:
 def _one_ball(setup: Setup, layout: Layout) -> Record:
     """Balls of the prototype, each by 50 stops of the base at known angles, nothing else free."""
     machine = replace(setup.designed, leds=layout.leds)
-    centres, radii = (np.full(one.shape, LARGE_MM) for one in (machine.centre, machine.radius))
-    prior = setup.prior(process_errors(load_process(USUAL_PROCESS)))
-    fixed = {block: np.zeros_like(sigma) for block, sigma in prior.sigma.items()}
-    leds = {Block.LEDS: np.zeros(machine.leds.shape)}
-    alone = replace(
-        prior, mean=machine, sigma=fixed | leds | {Block.CENTRES: centres, Block.RADII: radii}
-    )
+    series = np.zeros(len(machine.angle), dtype=np.int64)
+    alone = prior_of(machine, series, {Block.CENTRES: LARGE_MM, Block.RADII: LARGE_MM})
     stops = np.linspace(0, len(setup.plan.angle) - 1, STOPS_OF_ONE).round().astype(np.int64)
     frame, sphere, led = _seen(setup, machine, stops)
     known = _bound(alone, USUAL_PX, (frame, sphere, led))
@@ -154,11 +148,11 @@ def whole_errors(setup: Setup, leds: Floats, process: str, noise_px: float) -> R
     return known_rays(prior, np.zeros(len(prior.free)), known, frame, sphere)
 
 
-def _bound(prior: Prior, noise_px: float, seen: tuple[Ints, Ints, Ints]) -> Covariance:
-    """The covariance that highlights of one noise allow, at the prior's mean."""
+def _bound(prior: Prior, noise_px: float, seen: tuple[Ints, Ints, Ints]) -> Floats:
+    """The covariance (q, q) that highlights of one noise allow, at the prior's mean."""
     _, slopes = highlights_with_slopes(prior, np.zeros(len(prior.free)), *seen)
-    identity = diags_array(np.ones(slopes.shape[1]))
-    return covariance(prior, csc_array(slopes.T @ slopes / noise_px**2 + identity))
+    information = (slopes.T @ slopes).toarray() / noise_px**2
+    return np.linalg.inv(information + np.eye(len(information)))
 
 
 def _seen(setup: Setup, machine: Machine, frames: Ints) -> tuple[Ints, Ints, Ints]:

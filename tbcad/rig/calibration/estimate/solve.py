@@ -18,7 +18,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Covariance, Prior, covariance
+from tbcad.rig.calibration.estimate.parameters import Block, Prior, Slopes, covariances
 from tbcad.rig.machine.machine import Highlights, Machine
 from tbcad.types import Bools, Floats, Progress
 
@@ -61,9 +61,18 @@ class Estimate:
         return np.asarray(length / (self.highlights.sigma * self.noise_factor))
 
     @cached_property
-    def covariance(self) -> Covariance:
-        """Of the free parameters."""
-        return covariance(self.prior, self.information)
+    def covariance(self) -> Floats:
+        """Of the free parameters in prior standard deviations, (q, q)."""
+        return np.linalg.inv(self.information.toarray())
+
+    def sigmas(self) -> dict[Block, Floats]:
+        """Standard deviations of all parameters in their units, by block."""
+        return self.prior.blocks(np.sqrt(np.diag(self.covariance)))
+
+    def covariances(self, slopes: Slopes) -> Floats:
+        """Of n groups of d figures by their derivatives, (n, d, d)."""
+        size = next(iter(slopes.by.values())).shape[1]
+        return covariances(self.covariance, slopes.matrix(self.prior), size)
 
 
 def estimate(

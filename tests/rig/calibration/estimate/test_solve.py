@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scipy.sparse import csc_array, diags_array
 from scipy.stats import chi2
 
 from tbcad.common.results import study_files
@@ -17,8 +16,14 @@ from tbcad.core.optics.reflection import reflection_points
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.reflector import ExportedDesign, reflectors
-from tbcad.rig.calibration.estimate.jacobian import base_slopes, highlights_with_slopes, reflections
-from tbcad.rig.calibration.estimate.parameters import Block, Prior, covariance
+from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes, reflections
+from tbcad.rig.calibration.estimate.parameters import (
+    Block,
+    Prior,
+    base_slopes,
+    covariances,
+    prior_of,
+)
 from tbcad.rig.calibration.estimate.solve import Estimate, estimate, outlier_limit
 from tbcad.rig.calibration.led_layout import NUMBERS, only_spheres, ray_errors, shell_information
 from tbcad.rig.calibration.priors import (
@@ -87,18 +92,12 @@ def _all_rays(prior: Prior) -> tuple[np.ndarray, np.ndarray]:
     return frame[inside], sphere[inside]
 
 
-def test_blocks_are_those_of_the_dense_inverse(found: Estimate) -> None:
-    known = found.covariance
-    dense = np.linalg.inv(found.information.toarray())
+def test_covariances_are_blocks_of_that_of_all_figures(found: Estimate) -> None:
     slopes, _ = ray_slopes(found.prior, found.values, *_all_rays(found.prior))
-    full = slopes @ dense @ slopes.T
-    blocks = known.of(slopes, 4)
-    for k, block in enumerate(blocks):
+    full = slopes @ found.covariance @ slopes.T
+    for k, block in enumerate(covariances(found.covariance, slopes, 4)):
         expected = full[4 * k : 4 * k + 4, 4 * k : 4 * k + 4]
         assert block == pytest.approx(expected, rel=1e-6, abs=1e-12)
-    assert known.sigma() == pytest.approx(np.sqrt(np.diag(dense)), rel=1e-7)
-    vectors = np.random.default_rng(0).standard_normal((len(dense), 3))
-    assert known.times(vectors) == pytest.approx(dense @ vectors, rel=1e-7, abs=1e-9)
 
 
 def test_motions_are_taken_off_as_by_a_fit_to_each_error(found: Estimate) -> None:
@@ -184,12 +183,10 @@ def test_single_spheres_are_the_whole_model_with_all_else_fixed(export: Exported
     led, sphere = np.nonzero(information.by_led.any(axis=(2, 3)))
     free = only_spheres(designed_shell(export.reflectors[0], leds))
     known_to = {Block.CENTRES: SIGMA_MM, Block.RADII: RADIUS_MM}
-    sigma = {block: known_to.get(block, 0.0) * one for block, one in free.sigma.items()}
-    prior = replace(free, sigma=sigma)
+    prior = prior_of(free.mean, free.series, known_to)
     values, every = np.zeros(len(prior.free)), np.arange(len(mm))
     _, slopes = highlights_with_slopes(prior, values, 0 * led, sphere, led)
-    identity = diags_array(np.ones(len(values)))
-    known = covariance(prior, csc_array(slopes.T @ slopes / NOISE_PX**2 + identity))
+    known = np.linalg.inv((slopes.T @ slopes).toarray() / NOISE_PX**2 + np.eye(len(values)))
     rays = known_rays(prior, values, known, 0 * every, every).whole
     assert mm == pytest.approx(rays.place_mm, rel=1e-6)
     assert mrad == pytest.approx(rays.turn_mrad, rel=1e-6)
@@ -221,12 +218,12 @@ def test_every_case_has_figures(export: ExportedDesign) -> None:
     assert noises == sorted(noises)
 
 
-def prior_of(**known: Any) -> Prior:
+def of_prototype(**known: Any) -> Prior:
     return prototype_prior(MACHINE, ERRORS, BODY, np.arange(BALLS) == CAP, SERIES, 0.01, **known)
 
 
 def test_figures_are_those_of_the_process() -> None:
-    sigma = prior_of().sigma
+    sigma = of_prototype().sigma
     assert sigma[Block.CENTRES][0] == pytest.approx(np.full(3, ERRORS.seat.spread))
     tilted = np.hypot(ERRORS.seat.spread, ARM * ERRORS.cap_tilt.spread / UNIFORM)
     assert sigma[Block.CENTRES][CAP] == pytest.approx(np.full(3, tilted))
@@ -243,7 +240,7 @@ def test_figures_are_those_of_the_process() -> None:
 def test_a_measured_radius_replaces_the_drawing() -> None:
     parsed = parse_measured(("1=43.2", "2 = 34.61:0.005"), 5)
     assert parsed == ((0, 43.2, MEASURED_MM), (1, 34.61, 0.005))
-    prior = prior_of(measured=((CAP, 17.61, 0.004),))
+    prior = of_prototype(measured=((CAP, 17.61, 0.004),))
     assert (prior.mean.radius[CAP], prior.sigma[Block.RADII][CAP]) == (17.61, 0.004)
     assert np.delete(prior.mean.radius, CAP) == pytest.approx(np.delete(MACHINE.radius, CAP))
     assert MACHINE.radius[CAP] != 17.61
@@ -252,7 +249,7 @@ def test_a_measured_radius_replaces_the_drawing() -> None:
 @pytest.mark.parametrize("of_shell", [False, True])
 def test_a_known_lens_is_fixed(of_shell: bool) -> None:
     still = replace(MACHINE, angle=np.zeros(1))
-    known = shell_prior(still, ERRORS, lens_known=True) if of_shell else prior_of(lens_known=True)
+    known = shell_prior(still, ERRORS, lens_known=True) if of_shell else of_prototype(lens_known=True)
     for block in (Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION):
         assert not known.sigma[block].any()
 
@@ -309,7 +306,7 @@ def test_noise_that_is_larger_than_said_is_found(prior: Prior, factor: float) ->
 
 
 def test_two_series_have_offsets_of_their_own(prior: Prior) -> None:
-    offsets = prior.first["angle_offset"]
+    offsets = prior.first[Block.OFFSET]
     values = np.zeros(len(prior.free))
     values[np.searchsorted(prior.free, [offsets, offsets + 1])] = 3.0, -3.0
     machine = prior.machine(values)
