@@ -249,7 +249,9 @@ def test_a_measured_radius_replaces_the_drawing() -> None:
 @pytest.mark.parametrize("of_shell", [False, True])
 def test_a_known_lens_is_fixed(of_shell: bool) -> None:
     still = replace(MACHINE, angle=np.zeros(1))
-    known = shell_prior(still, ERRORS, lens_known=True) if of_shell else of_prototype(lens_known=True)
+    known = (
+        shell_prior(still, ERRORS, lens_known=True) if of_shell else of_prototype(lens_known=True)
+    )
     for block in (Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION):
         assert not known.sigma[block].any()
 

@@ -1,7 +1,6 @@
 """Lenses in the files of other programs, against what these programs say of them."""
 
 import re
-from itertools import product
 from pathlib import Path
 
 import cv2
@@ -167,26 +166,22 @@ def _read(folder: Path, text: str) -> CalibratedLens:
     return read_lens(file)
 
 
-MODEL_KEYS = ("distortion_model", "camera_model", "Model", "lensType", "projection", "distortion")
-MODELS = ("equidistant", "FISHEYE", "omni", "fov", "thin_prism", "kannala_brandt4", "mei", "new")
-
-
-def test_models_that_are_named_are_refused_whatever_the_key(tmp_path: Path) -> None:
-    for key, model in product(MODEL_KEYS, MODELS):
-        text = ROS.replace("distortion_model: plumb_bob", f"{key}: {model}")
-        with pytest.raises(InputError, match=f"lens model {key}: {model}: use a pinhole"):
-            _read(tmp_path, text)
-        assert _read(tmp_path, text.replace(model, "plumb_bob"))
+@pytest.mark.parametrize("model", ["equidistant", "FISHEYE", "thin_prism", "kannala_brandt4"])
+def test_other_models_and_keys_that_may_name_them_are_refused(tmp_path: Path, model: str) -> None:
+    for key in ("distortion_model", "camera_model", "lensType"):
+        says = "the key 'lensType'" if key == "lensType" else f"the lens model {key}: {model}: use"
+        with pytest.raises(InputError, match=says):
+            _read(tmp_path, ROS.replace("distortion_model: plumb_bob", f"{key}: {model}"))
 
 
 TAIL = {
-    "xi: 0.9": "lens model xi",
-    "is_fisheye: true": "lens model is_fisheye",
-    "fisheye: {a: 1}": "lens model fisheye",
-    "lens: {model: [pinhole, equi]}": "lens model model: equi",
-    "K: [1058.3, 0., 1040, 0., 1057.9, 770.5, 0., 0., 1.]": "2 cameras (camera_matrix, K)",
+    "xi: 0.9": "the key 'xi', which may name another lens",
+    "is_fisheye: true": "the key 'is_fisheye'",
+    "fisheye: {a: 1}": "the key 'fisheye'",
+    "lens: {model: [pinhole, equi]}": "the key 'lens'",
+    "K: [1058.3, 0., 1040, 0., 1057.9, 770.5, 0., 0., 1.]": "two of camera_matrix, K",
     "right: {K: [1058.3, 0., 1040, 0., 1057.9, 770, 0., 0., 1.]}": "2 cameras",
-    "D: [0.1, 0, 0, 0]": "two lists of distortion",
+    "D: [0.1, 0, 0, 0]": "two of distortion_coefficients, D",
     "resolution: [1040, 776]": "no clear size",
     "binning_x: 2": "binning_x",
     "roi: {x_offset: 10}": "roi",
@@ -205,7 +200,7 @@ CHANGED = {
     ("1e-3]", "1e-3, 0.1, 0, 0]"): "rows times cols",
     ("cols: 5\n  data: [", "cols: 8\n  data: [0, 0, 0, "): "(rational model)",
     ("0., 0., 1.]\ndist", "0., 1., 1.]\ndist"): "fx 0 cx, 0 fy cy, 0 0 1",
-    ("distortion_coefficients", "warp"): "no distortion_coefficients",
+    ("distortion_coefficients", "header"): "no distortion_coefficients",
     ("plumb_bob", "''"): "names no model",
     ("-0.05", "1e300"): "folds the picture",
 }
