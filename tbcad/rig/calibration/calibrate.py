@@ -22,8 +22,8 @@ from tbcad.rig.calibration.uncertainty import (
     FIGURES,
     PLACES,
     RayUncertainty,
+    known_rays,
     ray_slopes,
-    ray_uncertainty,
 )
 from tbcad.rig.machine.designed import designed_prototype, is_cap
 from tbcad.rig.machine.machine import Highlights, Machine
@@ -38,16 +38,29 @@ HALVES = {"angles": "frame", "LEDs": "led"}
 
 @dataclass(frozen=True)
 class Setup:
-    """A machine before it is calibrated: a prototype, or of a shell see `ShellSetup`."""
+    """A machine before it is calibrated: a prototype, or one camera of a shell.
+
+    Of a shell its mirrors are the balls of its plan.
+    """
 
     export: ExportedDesign
     plan: Plan
     frames: tuple[Frame, ...]  # that are photographed, in the order of the machine's
     designed: Machine  # the machine, at the angles of these frames
     lens: CalibratedLens | None = None  # of its camera, where it is known
+    geometry: Geometry = "prototype"
 
     def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
-        """Means and standard deviations by its process and by radii that are measured."""
+        """Means and standard deviations by its process and by radii that are measured.
+
+        InputError: radii of a shell are given as measured, which only balls and caps can be.
+        """
+        if self.geometry == "shell":
+            if measured:
+                raise InputError(
+                    "--measured is of balls and caps, and a shell has none: leave it out"
+                )
+            return shell_prior(self.designed, errors, self.lens is not None)
         home = Prototype.read(self.export.folder / NAME).home
         stop = np.array([frame.stop - 1 for frame in self.frames])
         known = (self.export.folder / StopRow.FILE).is_file()  # not of exports by old versions
@@ -64,20 +77,6 @@ class Setup:
         )
 
 
-@dataclass(frozen=True)
-class ShellSetup(Setup):
-    """One camera of a shell before it is calibrated: its mirrors are the balls of its plan."""
-
-    def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
-        """Means and standard deviations by its process.
-
-        InputError: radii are given as measured, which only balls and caps can be.
-        """
-        if measured:
-            raise InputError("--measured is of balls and caps, and a shell has none: leave it out")
-        return shell_prior(self.designed, errors, self.lens is not None)
-
-
 def prepared_setup(
     export: ExportedDesign,
     frames: tuple[Frame, ...],
@@ -89,7 +88,6 @@ def prepared_setup(
 
     InputError: the export has no prototype or LEDs, or another picture's size than the run.
     """
-    kind: type[Setup] = Setup if geometry == "prototype" else ShellSetup
     plan = plan_of(export, geometry, frames)
     machine = (
         designed_prototype(export, plan)
@@ -110,7 +108,8 @@ def prepared_setup(
         )
     angle = np.radians([frame.base_angle_deg for frame in frames])
     camera = machine.camera if lens is None else lens.on(machine.camera)
-    return kind(export, plan, frames, replace(machine, angle=angle, camera=camera), lens)
+    machine = replace(machine, angle=angle, camera=camera)
+    return Setup(export, plan, frames, machine, lens, geometry)
 
 
 @dataclass(frozen=True)
@@ -140,7 +139,7 @@ def calibrate(
     found = estimate(prior, detection.highlights, progress)
     progress("uncertainty of the rays")
     ids, absent, frame, sphere = ray_places(setup)
-    known = ray_uncertainty(found, frame, sphere)
+    known = known_rays(prior, found.values, found.covariance, frame, sphere)
     halves = cross_validation(found, frame, sphere, progress)
     return MachineCalibration(setup, detection, found, MirrorRays(ids, known, absent), halves)
 

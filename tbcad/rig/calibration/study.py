@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.geometry.vectors import unit
 from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
@@ -39,7 +39,6 @@ LARGE_MM = 10.0  # prior standard deviation that tells nothing
 ONE_BALL = "free, 50 stops"
 STOPS_OF_ONE = 50  # photographs of one ball on its base
 SHARES = (50, 95)  # percent of the mirrors
-WHERE = "an earlier estimate, other LEDs"
 NOTES = (
     "Bounds of Cramer and Rao: no estimate without bias is better. mrad: root mean square angle "
     "between a ray and the true one; mm: root mean square distance at the object's centre; both "
@@ -64,7 +63,10 @@ def calibration_study(export: ExportedDesign, progress: Progress) -> Study:
     progress("whole machines")
     whole = _whole_table(setup, placed, progress)
     places = _places_table(placed)
-    figures = _figures(alone, whole)
+    usual = next(row for row in whole.records() if row["noise_px"] == USUAL_PX)
+    figures = tuple(
+        Figure("rays after a run, fdm", unit, usual[f"{unit}_50"]) for unit in ("mm", "mrad")
+    )
     return Study(
         "calibration", figures, (alone, whole, places), panels(whole, USUAL_PROCESS), NOTES
     )
@@ -185,29 +187,6 @@ def _shares(mm: Floats, mrad: Floats) -> Record:
         for share in SHARES:
             figures[f"{name}_{share}"] = float(np.percentile(values, share))
     return figures
-
-
-def _figures(alone: Table, whole: Table) -> tuple[Figure, ...]:
-    """The bounds that were estimated before the program could compute them."""
-    rows = {(r["layout"], r["leds"], r["centre and radius"]): r for r in alone.records()}
-    before: tuple[tuple[str, Cell, tuple[str, int, str]], ...] = (
-        ("centre and radius free, four LEDs", 6.5, ("design", 4, "free")),
-        ("radius known, four LEDs", 2.5, ("design", 4, "radius known")),
-        ("prior of 25 um, four LEDs", 0.68, ("design", 4, "prior 25 um")),
-        ("prior of 25 um, 16 LEDs", 0.40, ("best", 16, "prior 25 um")),
-        ("one ball over 50 stops", 0.35, ("design", 4, ONE_BALL)),
-    )
-    figures = [
-        Figure(f"rays, {what}", "mrad", rows[key]["mrad_50"], value, WHERE)
-        for what, value, key in before
-        if key in rows
-    ]
-    usual = next(r for r in whole.records() if r["noise_px"] == USUAL_PX)
-    return (
-        *figures,
-        Figure("rays after a run, fdm", "mm", usual["mm_50"]),
-        Figure("rays after a run, fdm", "mrad", usual["mrad_50"]),
-    )
 
 
 def panels(whole: Table, process: str) -> tuple[PlotPanel, ...]:

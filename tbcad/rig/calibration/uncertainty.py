@@ -20,7 +20,6 @@ from tbcad.core.optics.reflection import reflected_rays
 from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.rig.calibration.estimate.jacobian import light_images, reflections
 from tbcad.rig.calibration.estimate.parameters import Prior, Slopes, covariances
-from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Floats, Ints
 
@@ -62,11 +61,6 @@ class RayUncertainty:
     # the axis of the object's half turn is
     in_run: RayCovariance
     pixel_mm: Floats  # width of a pixel of the photograph at the object's centre, mm, (m,)
-
-
-def ray_uncertainty(found: Estimate, frame: Ints, sphere: Ints) -> RayUncertainty:
-    """Covariance of an estimate's rays by spheres (m,) in frames (m,)."""
-    return known_rays(found.prior, found.values, found.covariance, frame, sphere)
 
 
 def known_rays(

@@ -18,7 +18,7 @@ from tbcad.rig.control.messages import (
     RESTING,
     STATES,
     Message,
-    Port,
+    SerialPort,
     Status,
     firmware_of,
     parse,
@@ -43,7 +43,7 @@ GONE = "the controller does not answer: is it plugged in and switched on?"
 class Grbl:
     """A controller on a port."""
 
-    def __init__(self, port: Port, note: Progress) -> None:
+    def __init__(self, port: SerialPort, note: Progress) -> None:
         """Speak to a controller; notes are what the operator should know."""
         self._port, self._note = port, note
         self._unread, self._messages = b"", deque[Message]()

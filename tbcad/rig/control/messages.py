@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.resources import files
-from typing import TYPE_CHECKING, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 from tbcad.errors import InputError
 from tbcad.rig.control.plan import MachineFault
@@ -40,21 +40,8 @@ STATES = {
 UNKNOWN = "its meaning is in the manual of the controller's firmware"
 
 
-class Port(Protocol):
-    """What a controller is spoken to through."""
-
-    def write(self, data: bytes) -> None:
-        """Send bytes."""
-
-    def read(self, wait: bool) -> bytes:
-        """Return the bytes that have come; wait for the first for a moment at most."""
-
-    def close(self) -> None:
-        """Give the port up."""
-
-
 class SerialPort:
-    """A port of pyserial's; its errors are those of a machine."""
+    """What a controller is spoken to through: pyserial's port, whose errors are a machine's."""
 
     def __init__(self, name: str) -> None:
         """Open a port."""

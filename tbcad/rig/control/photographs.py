@@ -23,7 +23,8 @@ from tbcad.cad.formats.pixels import TIFF_SIGNATURES
 from tbcad.errors import InputError
 from tbcad.records.prototype_drive import Phase
 from tbcad.records.run import Exposure, Frame, PhaseExposure, RunRecord, Setting, exposure_name
-from tbcad.rig.control.plan import CameraFault, ControlPlan, DrivenMachine
+from tbcad.rig.control.klipper_base import DrivenMachine
+from tbcad.rig.control.plan import CameraFault, ControlPlan
 from tbcad.rig.control.selection import RunSelection
 from tbcad.rig.runs import decoded_image
 

@@ -8,7 +8,7 @@ import hashlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.core.spec.prototype import MotionSpec
@@ -20,7 +20,6 @@ from tbcad.records.prototype import Prototype
 from tbcad.records.prototype_drive import Phase
 from tbcad.records.run import Frame
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow, StopRow
-from tbcad.types import Progress
 
 PROGRAM = "rotation_plan.nc"
 _MOVE = re.compile(r"G1 ([XA])(-?\d+\.\d+)(?: F\d+(?:\.\d+)?)?$")
@@ -226,33 +225,3 @@ class ControllerReset(MachineFault):
 
 class CameraFault(_Fault):
     """A photograph that was not taken, or cannot be used: the run goes on with the next."""
-
-
-class DrivenMachine(Protocol):
-    """Motions and lights of one machine; all but `secure` raise MachineFault when it fails."""
-
-    switch_s: float  # that it needs for the lights of a photograph
-
-    def connect(self) -> None:
-        """Wait until the controller answers."""
-
-    def check_settings(self, note: Progress, *, send: bool) -> None:
-        """Refuse settings that are not the build's by an InputError, or send and tell them."""
-
-    def home(self) -> None:
-        """Bring the base to a known angle, all lights off."""
-
-    def drive(self, move: Move, settle_s: float = 0.0) -> None:
-        """Drive to a place and rest there."""
-
-    def light(self, output: int, *, on: bool) -> None:
-        """Switch a light; the base is at rest then."""
-
-    def wait(self, seconds: float) -> None:
-        """Let lights that were switched settle."""
-
-    def release(self) -> None:
-        """Close the camera's relay for as long as it needs."""
-
-    def secure(self) -> str:
-        """Hold the base and switch all lights off; return what could not be done, if anything."""

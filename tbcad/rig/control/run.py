@@ -21,9 +21,9 @@ from tbcad.rig.control.cameras import (
 )
 from tbcad.rig.control.grbl import Grbl
 from tbcad.rig.control.klipper import PREFIX, Klipper, Moonraker, read_address
-from tbcad.rig.control.klipper_base import KlipperBase, read_klipper_files
+from tbcad.rig.control.klipper_base import DrivenMachine, KlipperBase, read_klipper_files
 from tbcad.rig.control.messages import SerialPort
-from tbcad.rig.control.plan import ControlPlan, DrivenMachine, MachineFault, read_control_plan
+from tbcad.rig.control.plan import ControlPlan, MachineFault, read_control_plan
 from tbcad.rig.control.selection import (
     BYTES_PER_PX,
     CAPTURE_S,

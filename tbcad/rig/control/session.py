@@ -8,6 +8,7 @@ from pathlib import Path
 from tbcad.errors import InputError
 from tbcad.options.machines import Ask, Preflight, Show
 from tbcad.records.run import Frame, exposure_name
+from tbcad.rig.control.klipper_base import DrivenMachine
 from tbcad.rig.control.photographs import (
     Photograph,
     RunCamera,
@@ -19,7 +20,7 @@ from tbcad.rig.control.photographs import (
     run_record,
     taken_twice,
 )
-from tbcad.rig.control.plan import CameraFault, ControlPlan, DrivenMachine, MachineFault
+from tbcad.rig.control.plan import CameraFault, ControlPlan, MachineFault
 from tbcad.rig.control.selection import (
     Outcome,
     RunSelection,

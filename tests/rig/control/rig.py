@@ -134,18 +134,16 @@ class Rig:
     def start(
         self,
         words: list[str],
-        before: Sequence[str] = (),
         module: str = "tests.rig.control.impatient",
-        terminal: int | None = None,
     ) -> "subprocess.Popen[str]":
-        """A command in a process of its own, with the virtual camera; at a terminal, if given."""
+        """A command in a process of its own, with the virtual camera."""
         return subprocess.Popen(
-            [*before, sys.executable, "-m", module, *words],
+            [sys.executable, "-m", module, *words],
             cwd=ROOT,
             env=self.environment(),
-            stdin=subprocess.DEVNULL if terminal is None else terminal,
+            stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE if terminal is None else terminal,
+            stderr=subprocess.PIPE,
             encoding="utf-8",
         )
 

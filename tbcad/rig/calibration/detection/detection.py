@@ -112,17 +112,14 @@ def _step(spots: int, saturated: int, unmeasured: Unmeasured, photographs: int) 
     return ELSEWHERE
 
 
-def relative_light(
-    expected: Expected, partner: Ints, spots: BrightSpots, exposure: Floats
-) -> Floats:
+def relative_light(expected: Expected, partner: Ints, spots: BrightSpots) -> Floats:
     """Light of each paired highlight over its sphere's and LED's usual light, (n,); else NaN.
 
-    The spot of each is -1 for none, (n,); exposures (m,) are over the usual one.
+    The spot of each is -1 for none, (n,).
     """
     share = np.full(len(partner), np.nan)
     on = partner >= 0
-    spot = partner[on]
-    share[on] = spots.light[spot] / (exposure[spot] * expected.light[on])
+    share[on] = spots.light[partner[on]] / expected.light[on]
     for group in (expected.led, expected.sphere):
         for number in np.unique(group[on]):
             mine = on & (group == number)

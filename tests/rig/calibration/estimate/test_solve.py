@@ -44,7 +44,6 @@ from tbcad.rig.calibration.uncertainty import (
     SPHERE_MM,
     known_rays,
     ray_slopes,
-    ray_uncertainty,
     rigid_motions,
 )
 from tbcad.rig.machine.designed import designed_shell, read_leds
@@ -109,7 +108,7 @@ def test_motions_are_taken_off_as_by_a_fit_to_each_error(found: Estimate) -> Non
     motions = rigid_motions(direction, np.where(turned[:, None], HALF_TURN, np.ones(3)))
     weight = np.tile([1.0, 1.0, SPHERE_MM, SPHERE_MM], len(frame))
     errors = slopes @ np.linalg.cholesky(dense)
-    known = ray_uncertainty(found, frame, sphere)
+    known = known_rays(found.prior, found.values, found.covariance, frame, sphere)
     row_turned = np.repeat(turned, 4)
     for groups, blocks in (
         ([np.ones(len(row_turned), dtype=bool)], known.relative.covariance),
@@ -162,7 +161,7 @@ def _errors_over_sigmas(prior: Prior, solves: int) -> np.ndarray:
     for seed in range(solves):
         _, machine = drawn(prior, 1000 + seed)
         result = estimate(prior, every_highlight(machine, 2000 + seed))
-        known = ray_uncertainty(result, *rays)
+        known = known_rays(prior, result.values, result.covariance, *rays)
         pixel = centre_pixels(result.machine, *rays)
         missed = at_plane(*traced(machine, pixel, *rays), known.direction)
         squares.append((missed**2).sum(axis=1) / known.whole.place_mm**2)
