@@ -31,6 +31,7 @@ from tbcad.records.run import (
     Exposure,
     Frame,
     RunRecord,
+    Setting,
     exposure_name,
     read_record,
 )
@@ -148,6 +149,29 @@ def _exposure(folder: Path, record: RunRecord, frame: Frame, phase: str) -> Expo
     if changed:
         raise InputError(f"{path}: {changed[0]} is not what the run is locked to: {AGAIN}")
     return found
+
+
+def exposure_of(
+    frame: Frame,
+    phase: str,
+    image: tuple[bytes, str, tuple[int, int]],
+    exposure_s: float | None,
+    taken: datetime,
+    settings: Mapping[str, Setting] | None = None,
+) -> Exposure:
+    """The sidecar of a photograph: its file's bytes and suffix, and columns and rows."""
+    data, suffix, (width, height) = image
+    return Exposure(
+        frame=frame,
+        phase=phase,
+        file=exposure_name(frame, phase) + suffix,
+        sha256=hashlib.sha256(data).hexdigest(),
+        width_px=width,
+        height_px=height,
+        exposure_s=exposure_s,
+        taken=taken,
+        settings=dict(settings or {}),
+    )
 
 
 def check_same_export(run: Run, exports: Path) -> None:

@@ -26,7 +26,7 @@ from tbcad.rig.calibration.uncertainty import (
     ray_slopes,
 )
 from tbcad.rig.machine.designed import designed_prototype, is_cap
-from tbcad.rig.machine.machine import Highlights, Machine
+from tbcad.rig.machine.machine import Machine
 from tbcad.rig.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.prototype.windows import read_wind_up
@@ -185,7 +185,9 @@ def _compared(
     found: Estimate, by: str, parts: list[Bools], rays: tuple[Ints, Ints], progress: Progress
 ) -> HalvesRecord:
     progress(f"halves with {by} apart")
-    one, other = (estimate(found.prior, _subset(found, part), start=found.values) for part in parts)
+    h = found.highlights
+    measured = replace(h, sigma=h.sigma * found.noise_factor)
+    one, other = (estimate(found.prior, measured.only(part), start=found.values) for part in parts)
     slopes, _ = ray_slopes(found.prior, found.values, *rays)
     # Parameters of single frames are left out: a half sees every other frame.
     static = diags_array((~found.prior.is_of(Of.FRAME)).astype(np.float64))
@@ -200,9 +202,3 @@ def _compared(
         found_mm=math.sqrt(float(difference @ difference) / count),
         expected_mm=math.sqrt(expected / count),
     )
-
-
-def _subset(found: Estimate, part: Bools) -> Highlights:
-    h = found.highlights
-    sigma = h.sigma[part] * found.noise_factor
-    return Highlights(h.frame[part], h.sphere[part], h.led[part], h.pixel[part], sigma)

@@ -1,6 +1,7 @@
 """A run from its start, or from where it stopped, to its end."""
 
 from contextlib import AbstractContextManager, suppress
+from datetime import UTC, datetime
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -14,7 +15,6 @@ from tbcad.rig.control.photographs import (
     RunCamera,
     Shot,
     check_like_record,
-    exposure_of,
     faults_refused,
     light_on,
     run_record,
@@ -33,7 +33,7 @@ from tbcad.rig.control.selection import (
     expected_seconds,
     size_text,
 )
-from tbcad.rig.runs import DiskFault, RunWriter, new_run, resumed_run
+from tbcad.rig.runs import DiskFault, RunWriter, exposure_of, new_run, resumed_run
 from tbcad.types import Progress
 
 MOST_MISSED = 12  # photographs one after the other: the camera is gone, not one photograph
@@ -194,7 +194,10 @@ class Session:
                     f"{MOST_MISSED} photographs in a row are missing: {fault}"
                 ) from None
         else:
-            self._writer.add(exposure_of(photograph, frame, phase), photograph.shot.data)
+            shot, seconds = photograph.shot, photograph.told_s or photograph.asked_s
+            image = shot.data, shot.suffix, photograph.size_px
+            now, settings = datetime.now(UTC), photograph.settings
+            self._writer.add(exposure_of(frame, phase, image, seconds, now, settings), shot.data)
             self._in_row = 0
 
     def finish(self, stopped: str, seconds: float, before: int) -> Outcome:

@@ -14,7 +14,7 @@ from tbcad.light.simulate.capture.files import capture_record, write_cameras, wr
 from tbcad.light.simulate.capture.light_field import RAY_SIGMAS
 from tbcad.light.simulate.capture.photograph import CameraPhotographs, RowBand
 from tbcad.light.simulate.prototype.merge import merge_photographs, merge_plan
-from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, ball_reflector
+from tbcad.light.simulate.prototype.run import PrototypeRun, ball_reflector
 from tbcad.light.simulate.scene.rays import meets_sphere
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.options.machines import MergeOptions
@@ -25,7 +25,6 @@ from tbcad.rig.machine.machine import RECORD, Machine, read_machine
 from tbcad.rig.machine.shells import NOT_SERVED, plan_of, tied
 from tbcad.rig.merged_run.stop_photographs import (
     CorrectedPhotographs,
-    Corrections,
     common_exposure,
     corrections,
 )
@@ -69,7 +68,10 @@ class HalfMerge:
     def bands(self, capture_mm: float, progress: Progress) -> Iterator[RowBand]:
         """Bands of the merged picture; what they lack is known when all were given."""
         in_front = partial(_shows_object, self.run.camera.pinhole, capture_mm / 2)
-        plan = merge_plan(self.run, capture_mm / 2, in_front, self._direct_stop())
+        frames = enumerate(self.photographs.frames)
+        # The first stop with a photograph also shows what is on no mirror.
+        direct = next((stop for stop, frame in frames if frame is not None), 0)
+        plan = merge_plan(self.run, capture_mm / 2, in_front, direct)
         for band in merge_photographs(plan, self.photographs, progress):
             mirror = band.rays.mirror.ravel()
             self.pixels[:] += np.bincount(mirror, minlength=len(self.pixels) + 1)[1:]
@@ -82,11 +84,6 @@ class HalfMerge:
             reason = self.photographs.missing.get(int(self.run.stop[mirror]), "no ray by its ball")
             reasons.setdefault(reason, []).append(mirror + 1)
         return reasons
-
-    def _direct_stop(self) -> int:
-        """The first stop with a photograph, which also shows what is on no mirror."""
-        frames = self.photographs.frames
-        return next((stop for stop, frame in enumerate(frames) if frame is not None), 0)
 
 
 @dataclass(frozen=True)
@@ -143,28 +140,19 @@ def _halves(
     machine, frames = calibrated
     _check_size(run, machine, calibration)
     plan = plan_of(export, run.record.geometry, run.record.frames)
-    corrected = corrections(options, machine.camera)
-    known = stops_known(plan, frames)
-    return [
-        _half(run, plan, known, corrected, half, machine_run(export, plan, machine, frames, half))
-        for half in range(len(TURNS))
-        if (plan.ball[half] != NOT_SERVED).all()
-    ]
-
-
-def _half(
-    run: Run, plan: Plan, known: Bools, corrected: Corrections, half: int, placed: PrototypeRun
-) -> HalfMerge:
-    of_stop = {
-        frame.stop - 1: frame
-        for frame in run.record.frames
-        if frame.object_turn_deg == TURNS[half] and frame.stop <= len(plan.angle)
-    }
-    stops = range(len(plan.angle))
-    frames = tuple(of_stop.get(stop) if known[half, stop] else None for stop in stops)
-    missing = {stop: "the run leaves this stop out" for stop in stops if stop not in of_stop}
-    photographs = CorrectedPhotographs(run, frames, corrected, common_exposure(run), missing)
-    return HalfMerge(placed, photographs, np.zeros(len(placed.stop), dtype=np.int64))
+    corrected, exposure = corrections(options, machine.camera), common_exposure(run)
+    known, stops = stops_known(plan, frames), range(len(plan.angle))
+    halves = []
+    for half, turn in enumerate(TURNS):
+        if (plan.ball[half] == NOT_SERVED).any():
+            continue
+        of_stop = {f.stop - 1: f for f in run.record.frames if f.object_turn_deg == turn}
+        shown = tuple(of_stop.get(stop) if known[half, stop] else None for stop in stops)
+        missing = {stop: "the run leaves this stop out" for stop in stops if stop not in of_stop}
+        photographs = CorrectedPhotographs(run, shown, corrected, exposure, missing)
+        placed = machine_run(export, plan, machine, frames, half)
+        halves.append(HalfMerge(placed, photographs, np.zeros(len(placed.stop), dtype=np.int64)))
+    return halves
 
 
 def _photographed(half: HalfMerge) -> bool:

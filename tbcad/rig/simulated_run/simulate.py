@@ -30,12 +30,10 @@ from tbcad.output.single_files import Source, refuse_inputs
 from tbcad.records.run import (
     PHOTOGRAPHS,
     RECORD,
-    Exposure,
     Frame,
     Geometry,
     PhaseTimes,
     RunRecord,
-    exposure_name,
 )
 from tbcad.rig.machine.designed import (
     BuiltPrototype,
@@ -46,7 +44,7 @@ from tbcad.rig.machine.designed import (
 )
 from tbcad.rig.machine.machine import truth_file, write_machine
 from tbcad.rig.machine.shells import perfect_half, random_half, shell_frame
-from tbcad.rig.runs import frames_of
+from tbcad.rig.runs import exposure_of, frames_of
 from tbcad.rig.simulated_run.led_light import Occluders, stage_scene
 from tbcad.rig.simulated_run.photographs import (
     EXPOSURE_S,
@@ -210,21 +208,12 @@ def _write_frames(
 def _write_photograph(
     folder: Path, frame: Frame, phase: str, image: Image16, seconds: float
 ) -> None:
-    name, data = exposure_name(frame, phase), BytesIO()
-    Image.fromarray(image).save(data, "png", compress_level=PNG_LEVEL)
-    (folder / f"{name}.png").write_bytes(data.getvalue())
-    sidecar = Exposure(
-        frame=frame,
-        phase=phase,
-        file=f"{name}.png",
-        sha256=hashlib.sha256(data.getvalue()).hexdigest(),
-        width_px=image.shape[1],
-        height_px=image.shape[0],
-        exposure_s=seconds,
-        taken=BEGIN,
-        settings={},
-    )
-    sidecar.write(folder / f"{name}.json")
+    file = BytesIO()
+    Image.fromarray(image).save(file, "png", compress_level=PNG_LEVEL)
+    data, size = file.getvalue(), (image.shape[1], image.shape[0])
+    sidecar = exposure_of(frame, phase, (data, ".png", size), seconds, BEGIN)
+    (folder / sidecar.file).write_bytes(data)
+    sidecar.write((folder / sidecar.file).with_suffix(".json"))
 
 
 def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Path) -> RunRecord:

@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +57,7 @@ from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.rig.machine.machine import TRUTH, Highlights, Machine, read_machine, write_machine
 from tests.photographed_runs import write_run
 from tests.rig.calibration.conftest import ERRORS, FAULT
-from tests.rig.calibration.machines import drawn, every_highlight, small_machine, small_prior
+from tests.rig.calibration.machines import drawn, every_highlight
 
 AXES = ("x", "y", "z")
 MACHINES = 24
@@ -213,12 +213,8 @@ def test_a_slipped_ball_is_doubted(setup: Setup, detection: Detection) -> None:
 def test_a_few_noisy_highlights_are_not_enough(setup: Setup, detection: Detection) -> None:
     """What the process leaves open stays open, and is said in the verdict."""
     h = detection.highlights
-    few = np.arange(0, len(h), 60)
-    noisy = replace(
-        h,
-        **{name: getattr(h, name)[few] for name in ("frame", "sphere", "led", "pixel")},
-        sigma=np.full(len(few), 20.0),
-    )
+    few = h.only(np.arange(0, len(h), 60))
+    noisy = replace(few, sigma=np.full(len(few), 20.0))
     errors = replace(ERRORS, seat=replace(ERRORS.seat, spread=3.0))
     result = calibrate(setup, replace(detection, highlights=noisy), setup.prior(errors))
     judged = verdict(result)
@@ -353,11 +349,6 @@ def test_less_noise_and_a_better_process_bound_rays_closer(setup: Setup) -> None
     assert np.median(whole_errors(setup, leds, "cnc", 0.1).relative.place_mm) < usual
 
 
-@pytest.fixture(scope="module")
-def prior() -> Prior:
-    return small_prior(small_machine(stops=6))
-
-
 def _halves(prior: Prior, highlights: Highlights) -> tuple[HalvesRecord, ...]:
     frame, sphere = np.zeros(len(prior.mean.radius), dtype=np.int64), np.arange(5)
     return cross_validation(estimate(prior, highlights), frame, sphere, lambda _: None)
@@ -384,6 +375,5 @@ def test_halves_that_contradict_each_other_are_seen(prior: Prior) -> None:
 
 def test_halves_of_too_few_highlights_are_left_out(prior: Prior) -> None:
     highlights = every_highlight(drawn(prior, 1)[1], 2)
-    kept = np.flatnonzero(highlights.led == 0)
-    few = Highlights(*(getattr(highlights, one.name)[kept] for one in fields(highlights)))
+    few = highlights.only(highlights.led == 0)
     assert [half.apart for half in _halves(prior, few)] == ["angles"]

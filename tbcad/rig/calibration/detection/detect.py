@@ -1,5 +1,6 @@
 """Find all highlights of a run."""
 
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -31,7 +32,6 @@ from tbcad.rig.calibration.detection.matching import (
 from tbcad.rig.calibration.detection.spots import (
     ROUNDING,
     BrightSpots,
-    Unmeasured,
     centroid_sigmas,
     find_spots,
     gain,
@@ -53,7 +53,7 @@ class _Read:
     """What a frame's photographs show."""
 
     spots: BrightSpots
-    unmeasured: Unmeasured
+    unmeasured: Counter[str]
     photographed: Bools  # which LEDs' photographs could be read, (l,)
     faults: tuple[str, ...]  # of the others, and of the dark one
     dark: Image16 | None  # the dark photograph, if it could be read
@@ -81,7 +81,7 @@ def detect(
     faults = [*run.faults.values(), *(fault for one in read for fault in one.faults)]
     nothing = partial(
         no_highlights,
-        unmeasured=sum((one.unmeasured for one in read), Unmeasured()),
+        unmeasured=sum((one.unmeasured for one in read), Counter[str]()),
         photographs=int(photographed.sum()),
     )
     try:
@@ -151,7 +151,7 @@ def _read_frame(
             there[led] = True
             found.append(find_spots(image, spare if own is None else own, number, led))
     spots, unmeasured = joined_spots([one for one, _ in found]), (other for _, other in found)
-    whole = sum(unmeasured, Unmeasured())
+    whole = sum(unmeasured, Counter[str]())
     return _Read(spots, whole, there, tuple(faults), own if number < 2 else None)
 
 

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
 from tbcad.rig.calibration.detection.matching import Expected
-from tbcad.rig.calibration.detection.spots import FULL, BrightSpots, Unmeasured, stacked
+from tbcad.rig.calibration.detection.spots import FULL, BrightSpots, stacked
 from tbcad.rig.machine.machine import Highlights
 from tbcad.types import Bools, Floats, Ints
 
@@ -69,7 +69,7 @@ class Detection:
 
 def no_highlights(
     spots: BrightSpots,
-    unmeasured: Unmeasured,
+    unmeasured: Counter[str],
     photographs: int,
     reasons: Reasons | None = None,
 ) -> InputError:
@@ -90,24 +90,24 @@ def no_highlights(
     return InputError(f"no highlights to calibrate from: {'; '.join(told)}: {step}")
 
 
-def _others(unmeasured: Unmeasured, photographs: int) -> list[str]:
-    large, of = unmeasured.large, f"of {photographs} photographs by LEDs"
+def _others(unmeasured: Counter[str], photographs: int) -> list[str]:
+    large, of = unmeasured["large"], f"of {photographs} photographs by LEDs"
     every = (
-        (large, f"{large} larger than a highlight, {unmeasured.saturated} of them saturated"),
-        (unmeasured.flooded, f"{unmeasured.flooded} {of} are full of light"),
-        (unmeasured.black, f"{unmeasured.black} {of} are black"),
+        (large, f"{large} larger than a highlight, {unmeasured['saturated']} of them saturated"),
+        (unmeasured["flooded"], f"{unmeasured['flooded']} {of} are full of light"),
+        (unmeasured["black"], f"{unmeasured['black']} {of} are black"),
     )
     return [text for number, text in every if number]
 
 
-def _step(spots: int, saturated: int, unmeasured: Unmeasured, photographs: int) -> str:
+def _step(spots: int, saturated: int, unmeasured: Counter[str], photographs: int) -> str:
     """What to do, by what there is most of."""
-    bright = spots + unmeasured.large
-    if unmeasured.flooded > HALF * photographs:
+    bright = spots + unmeasured["large"]
+    if unmeasured["flooded"] > HALF * photographs:
         return f"most are full of light: darken the room, or {SHORTER}"
-    if saturated + unmeasured.saturated > HALF * bright:
+    if saturated + unmeasured["saturated"] > HALF * bright:
         return f"the light is saturated: {SHORTER}"
-    if unmeasured.black > HALF * photographs:
+    if unmeasured["black"] > HALF * photographs:
         return f"most are too dark: {LONGER}"
     return ELSEWHERE
 

@@ -20,7 +20,7 @@ from tbcad.rig.calibration.detection.matching import (
     expected_highlights,
     highlights_of,
 )
-from tbcad.rig.calibration.detection.spots import Unmeasured, find_spots
+from tbcad.rig.calibration.detection.spots import find_spots
 from tbcad.rig.machine.machine import Highlights
 from tbcad.rig.runs import read_image, read_run
 from tbcad.rig.simulated_run.photographs import ImagingChain
@@ -241,11 +241,11 @@ def test_light_larger_than_a_highlight() -> None:
     image[50:54, 200:204] = 200
     spots, other = find_spots(image, None, 0, 0)
     assert len(spots) == 1
-    assert other == Unmeasured(large=2, saturated=1)
+    assert other == Counter(large=2, saturated=1)
     flood = np.full((800, 800, 3), 200, np.uint8)
-    assert find_spots(flood, None, 0, 0)[1] == Unmeasured(flooded=1)
-    assert find_spots(0 * flood, None, 0, 0)[1] == Unmeasured(black=1)
-    error = str(no_highlights(spots, other + other + Unmeasured(flooded=3), 4))
+    assert find_spots(flood, None, 0, 0)[1] == Counter(flooded=1)
+    assert find_spots(0 * flood, None, 0, 0)[1] == Counter(black=1)
+    error = str(no_highlights(spots, other + other + Counter(flooded=3), 4))
     assert "4 larger than a highlight, 2 of them saturated" in error
     assert "most are full of light: darken the room" in error
 
