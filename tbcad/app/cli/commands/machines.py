@@ -79,8 +79,8 @@ def calibrate(options: CalibrateOptions, json: JsonResult = False) -> int:
 def intrinsics(options: IntrinsicsOptions, json: JsonResult = False) -> int:
     """Solve the lens of a camera from photographs of a checkerboard or ChArUco board.
 
-    Boards may be partly out of the picture. Writes focal lengths, principal point and distortion
-    with their standard deviations, for tbcad calibrate --intrinsics.
+    A ChArUco board may be partly out of the picture. Writes focal lengths, principal point and
+    distortion with their standard deviations, for tbcad calibrate --intrinsics.
     """
     from tbcad.app.api import intrinsics as solve_intrinsics
 

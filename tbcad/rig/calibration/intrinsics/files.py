@@ -1,12 +1,14 @@
 """A lens read from a file of OpenCV, ROS, Kalibr, mrcal or COLMAP, recognised by what is in it.
 
-A file of keys may have those below and no others: another one may name a model of the lens that is
-not read here.
+A file of keys may have those of lens_files.toml and no others: another one may name a model of the
+lens that is not read here.
 """
 
 import ast
 import re
+import tomllib
 from collections import Counter
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeAlias
 from xml.etree import ElementTree
@@ -22,31 +24,9 @@ from tbcad.types import Floats
 Tree: TypeAlias = "dict[str, Tree] | list[Tree] | str"
 Node = dict[str, Tree]
 
-# Keys that are read ...
-MATRIX = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "K", "mtx", "intrinsics")
-COEFFICIENTS = (
-    *("distortion_coefficients", "Distortion_Coefficients", "distortion_coeffs"),
-    *("dist_coeffs", "dist_coeff", "dist", "D"),
-)
-WIDTH, HEIGHT = ("image_width", "image_Width", "width"), ("image_height", "image_Height", "height")
-SIZE = ("image_size", "resolution", "cameraResolution")
-MODEL = ("camera_model", "distortion_model", "model")
-FISHEYE, ROI, BINNING = "fisheye_model", "roi", ("binning_x", "binning_y")
-# ... and what else is written, by ROS, Kalibr, OpenCV's programs and tbcad intrinsics.
-OTHERS = (
-    *("camera_name", "rectification_matrix", "projection_matrix", "header", "R", "P"),
-    *("rostopic", "cam_overlaps", "T_cn_cnm1", "T_cam_imu", "timeshift_cam_imu"),
-    *("calibration_time", "calibrationDate", "nframes", "nr_of_frames", "framesCount", "flags"),
-    *("board_width", "board_height", "square_size", "marker_size", "aspectRatio"),
-    *("fix_aspect_ratio", "avg_reprojection_error", "per_view_reprojection_errors"),
-    *("extrinsic_parameters", "image_points", "grid_points"),
-    *("cameraMatrix_std_dev", "dist_coeffs_std_dev", "boards", "corners", "outliers", "rms_px"),
-    *(f"sigma_{name}" for name in ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")),
-)
-KNOWN = {*MATRIX, *COEFFICIENTS, *WIDTH, *HEIGHT, *SIZE, *MODEL, FISHEYE, ROI, *BINNING, *OTHERS}
-SUPPORTED = {"pinhole", "perspective", "plumbbob", "radtan", "radialtangential", "opencv"}
-SUPPORTED |= {"rationalpolynomial", "pinholeradtan", "pinholeplumbbob"}  # by the coefficients
-OFF, UNNAMED = {"", "0", "false", "no", "off"}, {"", "none", "null"}
+TABLE = tomllib.loads(files(__package__).joinpath("lens_files.toml").read_text("utf-8"))
+KEYS, MODELS = TABLE["keys"], TABLE["models"]
+OFF = {"", "0", "false", "no", "off"}
 COUNTS = (0, 4, 5, 8, 12, 14)
 SKEW = 1e-6  # of the focal length, that is taken for none
 NO_MATRIX = "has no camera_matrix of 3 x 3 numbers: export it again"
@@ -60,7 +40,7 @@ def camera_lens(tree: Node, name: str) -> CalibratedLens:
     """
     inner = {key: node for key, node in tree.items() if isinstance(node, dict)}
     nodes = {"": tree, **inner}
-    cameras = {label: node for label, node in nodes.items() if node.keys() & set(MATRIX)}
+    cameras = {label: node for label, node in nodes.items() if node.keys() & {*KEYS["matrix"]}}
     if len(cameras) > 1:
         raise InputError(
             f"{name} has {len(cameras)} cameras ({', '.join(filter(None, cameras)):.80}): "
@@ -72,15 +52,15 @@ def camera_lens(tree: Node, name: str) -> CalibratedLens:
     if label:
         camera = {key: one for key, one in tree.items() if key != label} | camera
     _check_keys(camera, name)
-    coefficients = _only(camera, COEFFICIENTS, name, "distortion_coefficients")
+    coefficients = _only(camera, "coefficients", name, "distortion_coefficients")
     if len(coefficients) not in COUNTS:
         raise InputError(
             f"{name} has {len(coefficients)} coefficients of distortion, OpenCV's are "
             f"{', '.join(map(str, COUNTS))}: give k1, k2, p1, p2, k3, of a lens without, zeros"
         )
-    models = [_plain(str(camera[key])) for key in MODEL if key in camera]
+    models = [_plain(str(camera[key])) for key in KEYS["model"] if key in camera]
     focal_and_principal = _intrinsics(camera, models, name)
-    if UNNAMED & {*models} and numbers_of(coefficients, name).any():
+    if {*MODELS["unnamed"]} & {*models} and numbers_of(coefficients, name).any():
         raise InputError(f"{name} names no model of its distortion: {USABLE}")
     return lens_of(focal_and_principal, coefficients, _size(camera, name), name)
 
@@ -91,38 +71,40 @@ def _plain(text: str) -> str:
 
 def _check_keys(camera: Node, name: str) -> None:
     """Refuse keys that are not known, other models, and a part of the picture's pixels."""
+    kinds = {key: kind for kind, keys in KEYS.items() for key in keys}
+    models = {*MODELS["supported"], *MODELS["unnamed"]}
     for key, value in camera.items():
-        if key not in KNOWN:
+        kind, text = kinds.get(key), str(value).strip()
+        if kind is None:
             raise InputError(
                 f"{name} has the key {key!r:.40}, which may name another lens model: remove it if "
                 f"it does not; {USABLE}"
             )
-        text = str(value).strip()
-        if (key in MODEL and _plain(text) not in SUPPORTED | UNNAMED) or (
-            key == FISHEYE and text.lower() not in OFF
+        if (kind == "model" and _plain(text) not in models) or (
+            kind == "fisheye" and text.lower() not in OFF
         ):
             raise InputError(f"{name} has the lens model {key}: {text:.40}: {USABLE}")
         parts = value.values() if isinstance(value, dict) else [value]
-        whole = OFF | {"1"} if key in BINNING else OFF
-        if key in (ROI, *BINNING) and any(str(part).lower() not in whole for part in parts):
+        whole = OFF if key == "roi" else OFF | {"1"}
+        if kind == "part" and any(str(part).lower() not in whole for part in parts):
             raise InputError(
                 f"{name} has {key}, so the matrix is of another picture: calibrate the photographs "
                 "as they are"
             )
 
 
-def _only(camera: Node, keys: tuple[str, ...], name: str, what: str) -> list[str]:
-    """Numbers under the one of some keys that a camera has."""
-    found = [key for key in keys if key in camera]
+def _only(camera: Node, what: str, name: str, usual: str) -> list[str]:
+    """Numbers under the one key of a kind that a camera has."""
+    found = [key for key in KEYS[what] if key in camera]
     if len(found) != 1:
-        told = f"two of {', '.join(found)}: keep one" if found else f"no {what}: export it again"
+        told = f"two of {', '.join(found)}: keep one" if found else f"no {usual}: export it again"
         raise InputError(f"{name} has {told}")
     return _numbers(camera[found[0]], name)
 
 
 def _intrinsics(camera: Node, models: list[str], name: str) -> list[float]:
     """Focal lengths and principal point, from a matrix or Kalibr's four numbers."""
-    numbers = numbers_of(_only(camera, MATRIX, name, "camera_matrix"), name)
+    numbers = numbers_of(_only(camera, "matrix", name, "camera_matrix"), name)
     if "intrinsics" in camera and len(numbers) == 4:
         if len(models) < 2:
             raise InputError(f"{name} names no camera_model and distortion_model: {USABLE}")
@@ -157,9 +139,11 @@ def _numbers(node: Tree, name: str) -> list[str]:
 
 def _size(camera: Node, name: str) -> list[Tree]:
     """Columns and rows, which may be told in several ways that agree."""
-    sides = [[camera[key] for key in keys if key in camera] for keys in (WIDTH, HEIGHT)]
-    sizes = [[*sides[0], *sides[1]]] if any(sides) else []
-    sizes += [one if isinstance(one := camera[key], list) else [] for key in SIZE if key in camera]
+    widths, heights, pairs = (
+        [camera[key] for key in KEYS[what] if key in camera] for what in ("width", "height", "size")
+    )
+    sizes = [[*widths, *heights]] if widths or heights else []
+    sizes += [one if isinstance(one, list) else [] for one in pairs]
     if not sizes or any(size != sizes[0] for size in sizes) or len(sizes[0]) != 2:
         what = "no size" if not sizes else "no clear size"
         raise InputError(
@@ -172,15 +156,6 @@ MAX_BYTES = 2_000_000
 COLMAP_CENTRE = 0.5
 """COLMAP's pixels begin at whole numbers, so their centres are half a pixel farther."""
 COLMAP_CAMERA = re.compile(r"\d+[ \t]+[A-Z][A-Z_]+[ \t]+\d+[ \t]+\d+([ \t]|$)")
-# Each model's parameters in the order focal x, focal y, principal x and y, k1, k2, p1, p2, k3 ...
-COLMAP = {
-    "SIMPLE_PINHOLE": (0, 0, 1, 2),
-    "PINHOLE": (0, 1, 2, 3),
-    "SIMPLE_RADIAL": (0, 0, 1, 2, 3),
-    "RADIAL": (0, 0, 1, 2, 3, 4),
-    "OPENCV": (0, 1, 2, 3, 4, 5, 6, 7),
-    "FULL_OPENCV": tuple(range(12)),
-}
 MRCAL = re.compile(r"LENSMODEL_(PINHOLE|OPENCV(4|5|8|12))")
 MRCAL_FILE = re.compile(r"['\"]lens_?model['\"]\s{0,9}:\s{0,9}b?['\"](LENSMODEL|CAHV)")
 LOADER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
@@ -231,7 +206,7 @@ def _colmap(lines: list[str], name: str) -> CalibratedLens:
     if len(lines) != 1:
         raise InputError(f"{name} has {len(lines)} cameras: keep the line of the run's")
     _, model, width, height, *given = lines[0].split()
-    order = COLMAP.get(model)
+    order = TABLE["colmap"].get(model)
     if order is None:
         raise InputError(f"{name} has the lens model {model:.60}: {USABLE} (model OPENCV)")
     if len(given) != max(order) + 1:

@@ -22,15 +22,11 @@ LENS = CalibratedLens(
     height_px=1552,
 )
 FOUR = "1058.3 1057.9 1040.75 771.0"
-MRCAL = """# mrcal camera model; comments may be anywhere
-{
-    'lensmodel':  'LENSMODEL_OPENCV4',
-    'extrinsics': [ 0., 0, 0, 0, 0, 0,],
-    'intrinsics': [ 1058.3, 1057.9, 1040.25, 770.5, -0.05, 0.01, 1e-3, -5e-4],
-    'imagersize': [ 2080, 1552,],
-    'icam_intrinsics': 0,
-}
-"""
+FILES = Path(__file__).parent / "lens_files"
+"""As other programs write the same lens."""
+ROS = (FILES / "ros_k3.yaml").read_text()
+KALIBR = (FILES / "kalibr.yaml").read_text()
+MRCAL = (FILES / "mrcal.cameramodel").read_text()
 
 
 def mrcal(model: str, more: str) -> str:
@@ -102,55 +98,12 @@ REFUSED: dict[str, tuple[str, str]] = {
     "fisheye in OpenCV": (opencv_text(LENS, {"fisheye_model": 1}), "lens model fisheye_model: 1"),
     "damaged": ("%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: [", "line 5: no YAML"),
 }
-ROS = """image_width: 2080
-image_height: 1552
-camera_name: fisheye_left
-camera_matrix:
-  rows: 3
-  cols: 3
-  data: [1058.3, 0., 1040.25, 0., 1057.9, 770.5, 0., 0., 1.]
-distortion_model: plumb_bob
-distortion_coefficients:
-  rows: 1
-  cols: 5
-  data: [-0.05, 0.01, 1e-3, -5e-4, 1e-3]
-projection_matrix:
-  rows: 3
-  cols: 4
-  data: [990., 0., 1030., 0., 0., 990., 760., 0., 0., 0., 1., 0.]
-"""
-ROS_MESSAGE = """height: 1552
-width: 2080
-distortion_model: rational_polynomial
-D: [-0.05, 0.01, 1e-3, -5e-4, 1e-3, 0, 0, 0]
-K: [1058.3, 0., 1040.25, 0., 1057.9, 770.5, 0., 0., 1.]
-binning_x: 0
-binning_y: 0
-roi: {x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: False}
----
-"""
-KALIBR = """cam0:
-  camera_model: pinhole
-  distortion_coeffs: [-0.05, 0.01, 1e-3, -5e-4]
-  distortion_model: radtan
-  intrinsics: [1058.3, 1057.9, 1040.25, 770.5]
-  resolution: [2080, 1552]
-  rostopic: /omni/image_raw
-"""
-TUTORIAL = """camera_matrix: [[1058.3, 0, 1040.25], [0, 1057.9, 770.5], [0, 0, 1]]
-dist_coeff: [[-0.05, 0.01, 1e-3, -5e-4, 1e-3]]
-image_size: [2080, 1552]
-"""
 
 
-COLMAP = f"# Camera list\n1 OPENCV 2080 1552 {FOUR} -0.05 0.01 1e-3 -5e-4\n"  # from a corner
-WITH_K3 = (ROS, ROS_MESSAGE, TUTORIAL)
-
-
-@pytest.mark.parametrize("text", [*WITH_K3, KALIBR, MRCAL, COLMAP])
-def test_files_of_other_programs(tmp_path: Path, text: str) -> None:
-    k3 = 1e-3 if text in WITH_K3 else 0
-    _same(_read(tmp_path, text), np.array([-0.05, 0.01, 1e-3, -5e-4, k3]))
+@pytest.mark.parametrize("file", sorted(FILES.iterdir()), ids=lambda file: str(file.name))
+def test_files_of_other_programs(file: Path) -> None:
+    k3 = 1e-3 if "k3" in file.stem else 0
+    _same(read_lens(file), np.array([-0.05, 0.01, 1e-3, -5e-4, k3]))
 
 
 @pytest.mark.parametrize(("encoding", "end"), [("utf-8-sig", "\r\n"), ("utf-16", "\r")])
