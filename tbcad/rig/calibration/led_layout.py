@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from tbcad.core.geometry.vectors import norm
+from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, hidden_by_object, pillar_radius
@@ -26,7 +27,6 @@ RINGS, AZIMUTHS, HEIGHTS = 2, 18, 5  # of the places that are tried; azimuths ov
 NUMBERS = (4, 6, 8, 16)
 USUAL_PX, USUAL_PROCESS = 0.05, "fdm"
 FREE, PRIOR_MM = np.inf, 0.025
-HALF_TURN = np.array([-1.0, -1.0, 1.0])
 MAX_ROUNDS = 6
 DIGITS = 2  # of places in mm
 

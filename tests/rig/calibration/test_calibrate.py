@@ -54,7 +54,7 @@ from tbcad.rig.calibration.report.verdict import Answer, verdict, verdict_text
 from tbcad.rig.calibration.run import write_calibration
 from tbcad.rig.calibration.study import whole_errors
 from tbcad.rig.machine.designed import BuiltPrototype
-from tbcad.rig.machine.machine import TRUTH, Highlights, Machine, read_machine, write_machine
+from tbcad.rig.machine.machine import TRUTH, Highlights, read_machine, write_machine
 from tests.photographed_runs import write_run
 from tests.rig.calibration.conftest import ERRORS, FAULT
 from tests.rig.calibration.machines import drawn, every_highlight
@@ -116,34 +116,6 @@ def test_errors_of_rays_are_those_predicted(
     ):
         for off, sigma in ((place_mm(found), place), (turn_mrad(found), turn)):
             assert np.sqrt((off**2).mean()) < 3 * np.sqrt((sigma**2).mean())
-
-
-def test_a_rotation_of_the_whole_machine_is_not_an_error_within_a_run(
-    calibrated: MachineCalibration,
-) -> None:
-    """But it is between both, where it is about a level axis: the object turns about z."""
-    found, rays = calibrated.found, calibrated.rays.known
-    errors = ray_errors(found, _turned(found.machine, 1e-3), rays.frame, rays.sphere)
-    assert np.median(turn_mrad(errors.relative)) > 0.3
-    assert turn_mrad(errors.in_run).max() < 0.01
-
-
-def _turned(machine: Machine, angle: float) -> Machine:
-    """About the direction x through the object's centre."""
-    x = np.array([1.0, 0.0, 0.0])
-
-    def turned(vectors: np.ndarray) -> np.ndarray:
-        many = np.atleast_2d(vectors)
-        return rotated(many, x, np.full(len(many), angle)).reshape(np.shape(vectors))
-
-    camera = machine.camera
-    places = ("axis", "axis_point", "centre", "leds")
-    return replace(
-        machine,
-        camera=replace(camera, pinhole=turned(camera.pinhole), axes=turned(camera.axes)),
-        shift=None if machine.shift is None else turned(machine.shift),
-        **{name: turned(getattr(machine, name)) for name in places},
-    )
 
 
 @pytest.mark.slow
