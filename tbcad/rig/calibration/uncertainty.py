@@ -10,7 +10,7 @@ gives how the ray moves in that plane. The same for a second plane gives how it 
 single centre of projection, which this camera does not have.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -19,7 +19,7 @@ from tbcad.core.geometry.vectors import perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.rig.calibration.estimate.jacobian import light_images, reflections
-from tbcad.rig.calibration.estimate.parameters import Prior, Slopes, covariances
+from tbcad.rig.calibration.estimate.parameters import Prior, covariances
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Floats, Ints
 
@@ -153,15 +153,22 @@ def ray_slopes(prior: Prior, values: Floats, frame: Ints, sphere: Ints) -> tuple
     machine = prior.machine(values)
     direction = ray_directions(machine, frame, sphere)
     across = perpendicular_axes(direction)
-    near, far = (
-        _moved(prior, values, machine, (frame, sphere), distance * direction, across)
+    images = [
+        light_images(prior, values, machine, frame, sphere, distance * direction)
         for distance in (0.0, APART_MM)
+    ]
+    near, far = (
+        {
+            block: -np.linalg.solve(one.by_light @ across.swapaxes(1, 2), value)
+            for block, value in one.slopes.by.items()
+        }
+        for one in images
     )
-    by = {
-        block: np.concatenate([place, (far.by[block] - place) / APART_MM], axis=1)
-        for block, place in near.by.items()
+    rows = {
+        block: np.concatenate([place, (far[block] - place) / APART_MM], axis=1)
+        for block, place in near.items()
     }
-    return Slopes(near.of, by).matrix(prior), direction
+    return replace(images[0].slopes, by=rows).matrix(prior), direction
 
 
 def ray_directions(machine: Machine, frame: Ints, sphere: Ints) -> Floats:
@@ -170,24 +177,6 @@ def ray_directions(machine: Machine, frame: Ints, sphere: Ints) -> Floats:
     pinhole = machine.camera.pinhole
     point = reflections(centre, radius, np.zeros_like(centre), pinhole).point
     return reflected_rays(pinhole, point, unit(point - centre))
-
-
-def _moved(
-    prior: Prior,
-    values: Floats,
-    machine: Machine,
-    ray: tuple[Ints, Ints],
-    light: Floats,
-    across: Floats,
-) -> Slopes:
-    """How the rays move in the planes through lights (m, 3) on them, along across (m, 2, 3)."""
-    image = light_images(prior, values, machine, *ray, light)
-    by_place = image.by_light @ across.swapaxes(1, 2)
-    by = {
-        block: np.asarray(-np.linalg.solve(by_place, value))
-        for block, value in image.slopes.by.items()
-    }
-    return Slopes(image.slopes.of, by)
 
 
 def _root(covariance_of_two: Floats) -> Floats:

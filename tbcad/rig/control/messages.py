@@ -30,13 +30,8 @@ _FIRMWARES = {"grblhal": re.compile(r"grblhal", re.I), "grbl": re.compile(r"Grbl
 _CODE = re.compile(r"(error|ALARM):(\d+)")
 _SETTING = re.compile(r"\$(\d+)=(-?\d+(?:\.\d+)?)")
 _PLACES = ("MPos", "WPos", "WCO")
-STATES = {
-    "Idle": "look at its cable",
-    "Alarm": "it is locked, and takes $X or $H only",
-    "Check": "it moves nothing in check mode: reset it",
-    "Sleep": "its motor is off, and the base may have fallen: zero pin in, then start again",
-}
-"""What a controller that rests, and answers a line by nothing, wants."""
+CODES = tomllib.loads(files(__package__).joinpath("grbl_codes.toml").read_text("utf-8"))
+STATES: dict[str, str] = CODES["resting"]
 UNKNOWN = "its meaning is in the manual of the controller's firmware"
 
 
@@ -179,5 +174,4 @@ def _numbers(text: str) -> tuple[float, ...]:
 
 def told(line: str, message: Message) -> str:
     """An error or alarm that answers a line, with its meaning."""
-    codes = tomllib.loads(files(__package__).joinpath("grbl_codes.toml").read_text("utf-8"))
-    return f"{line!r}: {message.text}: {codes[message.kind].get(str(message.code), UNKNOWN)}"
+    return f"{line!r}: {message.text}: {CODES[message.kind].get(str(message.code), UNKNOWN)}"

@@ -230,5 +230,4 @@ def based_on(half: HalfMerge) -> dict[str, Any]:
         "photographs_not_used": {name: fault for name, fault in run.faults.items() if name in names}
         | unread,
         "without_dark": sorted(half.photographs.without_dark),
-        "dark_scaled": sorted(half.photographs.dark_scaled),
     }

@@ -3,7 +3,6 @@
 import shutil
 import socket
 from collections.abc import Iterator
-from dataclasses import astuple
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from threading import Thread
@@ -11,7 +10,7 @@ from threading import Thread
 import pytest
 
 from tbcad.app.cli import run as tbcad
-from tbcad.rig.control import klipper, klipper_base
+from tbcad.rig.control import klipper_base
 from tests.rig.control.conftest import Told
 from tests.rig.control.klipper_double import MOTOR
 from tests.rig.control.rig import Rig, until
@@ -122,6 +121,7 @@ def test_key(klipper_rig: Rig, refused: Told, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("MOONRAKER_API_KEY", "one\ntwo")
     assert "is no API key" in refused(klipper_rig.words())
     monkeypatch.setenv("MOONRAKER_API_KEY", "1234")
+    klipper_rig.controller.port = klipper_rig.controller.port.replace("http:", "HTTP:") + "/"
     assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
 
 
@@ -228,18 +228,6 @@ def test_same_values(wanted: str, found: object, same: bool) -> None:
     assert list(klipper_base.differences({"a": {"b": wanted}}, {"a": {"b": found}})) == (
         [] if same else [f"b of [a] is {found!r}, not {wanted}"]
     )
-
-
-@pytest.mark.parametrize(
-    ("text", "address"),
-    [
-        ("http://[::1]", ("::1", 80, "", False)),
-        ("https://printer/", ("printer", 443, "", True)),
-        ("HTTP://Printer:7125/one/", ("printer", 7125, "/one", False)),
-    ],
-)
-def test_addresses_that_are_read(text: str, address: tuple[object, ...]) -> None:
-    assert astuple(klipper.read_address(text)) == address
 
 
 def test_exports_that_are_not_for_klipper(

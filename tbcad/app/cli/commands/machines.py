@@ -32,7 +32,6 @@ FEW_NAMES = 6  # of missing mirrors in a line
 NOT_WHOLE = {
     "photographs_not_used": "photographs not used",
     "without_dark": "without a dark photograph of their exposure",
-    "dark_scaled": "whose dark photograph was exposed otherwise, and is scaled",
 }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.light.simulate.parallel import THREADS
-from tbcad.records.run import DARK, Frame, dark_factor, exposure_name
+from tbcad.records.run import DARK, Frame, exposure_name, same_exposure
 from tbcad.rig.calibration.detection.detection import (
     Detection,
     Reasons,
@@ -165,7 +165,7 @@ def _photograph(
     exposure = run.exposure(frame, phase)
     if exposure is None:
         return None, None
-    if dark_factor(exposure.exposure_s, usual) != 1:
+    if not same_exposure(exposure.exposure_s, usual):
         return None, (
             f"{exposure_name(frame, phase)} was exposed for {exposure.exposure_s:g} s and not for "
             f"{usual:g} s as most photographs by LEDs: it is not used"
