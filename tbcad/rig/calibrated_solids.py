@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -140,7 +139,7 @@ def legend(scale_um: float) -> bytes:
     """A picture of the colours from 0 to the end of the scale, PNG."""
 
     def draw(figure: "Figure") -> None:
-        axes = figure.add_axes((0.06, 0.5, 0.88, 0.3))
+        axes = figure.add_subplot()
         shades = colours(np.linspace(0, 1, SHADES))[None]
         axes.imshow(shades, extent=(0, scale_um, 0, 1), aspect="auto")
         axes.set(yticks=[], xlabel="centre off the designed base, micrometres")
@@ -190,28 +189,25 @@ def as_built_tolerance(
     """
     export = read_export(exports)
     plan, (machine, frames) = read_plan(export), read_machine(calibration / RECORD)
-    runs, known = machine_runs(export, plan, machine, frames), stops_known(plan, frames)
-    names = [mirror_ids(run.reflector.camera_id, len(run.reflector)) for run in runs]
-    rays = {ray.mirror: ray for ray in RayRow.read(calibration)}
-    covered = np.concatenate([*map(_coverage, runs)])
-    coverage = dict(zip(chain(*names), covered.tolist(), strict=True))
-    seen = np.concatenate([known[half, plan.stop[half]] for half in range(len(runs))])
-    every = zip(chain(*names), seen.tolist(), strict=True)
-    ids = [name for name, calibrated in every if calibrated and name in rays]
-    if not ids:
+    rays, known = {ray.mirror: ray for ray in RayRow.read(calibration)}, stops_known(plan, frames)
+    records, absent = list[dict[str, Any]](), list[str]()
+    for half, run in enumerate(machine_runs(export, plan, machine, frames)):
+        names = mirror_ids(run.reflector.camera_id, len(run.reflector))
+        calibrated = known[half, plan.stop[half]]
+        for name, shown_mm, seen in zip(names, _coverage(run).tolist(), calibrated, strict=True):
+            if not seen or name not in rays:
+                absent.append(name)
+                continue
+            figures = {figure: getattr(rays[name], figure) for figure in RAY_FIGURES}
+            records.append({"mirror": name, "coverage_mm": shown_mm, **figures})
+    if not records:
         raise InputError(f"{calibration / RayRow.FILE} names no mirror of {exports}: {CALIBRATE}")
-    records = [
-        {"mirror": name, "coverage_mm": coverage[name]}
-        | {figure: getattr(rays[name], figure) for figure in RAY_FIGURES}
-        for name in ids
-    ]
     mirrors = Table.of_records("as-built", records)
     shown, place = mirrors.numbers("coverage_mm"), mirrors.numbers("sigma_mm")
     random, size = np.random.default_rng(seed), (len(place), AXES)
     lost = (2 * norm(random.standard_normal(size)) * place / np.sqrt(AXES) for _ in range(builds))
     worst = np.array([(shown - one).min() for one in lost])
-    absent = tuple(sorted({*coverage} - {*ids}))
-    return AsBuiltTolerance(export.capture_mm, mirrors, absent, worst)
+    return AsBuiltTolerance(export.capture_mm, mirrors, tuple(absent), worst)
 
 
 def tolerance_record(found: AsBuiltTolerance, builds: int, seed: int) -> dict[str, Any]:

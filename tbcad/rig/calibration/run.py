@@ -213,10 +213,9 @@ def _recovered_text(
     figures = sum(len(kind.sigma) for kind in kinds)
     within = sum(kind.within * len(kind.sigma) for kind in kinds) / figures
     known = result.rays.known
-    errors = ray_errors(result.found, truth, known.frame, known.sphere)
     found = [
         f"{np.median(place_mm(one)):.3f} mm, {np.median(turn_mrad(one)):.2f} mrad"
-        for one in (errors.relative, errors.in_run)
+        for one in ray_errors(result.found, truth, known.frame, known.sphere)
     ]
     lines = [
         f"of {figures} errors that were simulated, {within:.0%} are recovered to two standard "

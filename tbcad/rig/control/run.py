@@ -8,7 +8,7 @@ from time import monotonic
 
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
-from tbcad.options.machines import Ask, RunOptions, Show
+from tbcad.options.machines import RunOptions, Show
 from tbcad.options.shared import exposures
 from tbcad.output.manifest import refuse_inside
 from tbcad.output.single_files import refuse_inputs
@@ -78,19 +78,18 @@ def run_machine(options: RunOptions) -> Outcome:
         with _secured(base, note):
             camera = connected_camera(options.camera, options.timeout_s)
             stack.callback(camera.close)
-            session = Session(plan, chosen, base, camera)
+            session = Session(plan, chosen, (base, camera), (ask, note))
             with _faults_as_input_errors(port):
-                look = options.preflight
-                session.begin(out, ask, note, resume=options.resume, look=look)
-            if look == "only":
+                session.begin(out, resume=options.resume, look=options.preflight)
+            if options.preflight == "only":
                 return Outcome(out, 0, 0, 0, {}, "", base.secure(), 0.0)
-            return _photographed(session, ask, options.show or partial(stages, silent=True))
+            return _photographed(session, options.show or partial(stages, silent=True))
 
 
-def _photographed(session: Session, ask: Ask, show: Show) -> Outcome:
+def _photographed(session: Session, show: Show) -> Outcome:
     begun, before, stopped = monotonic(), session.taken, ""
     try:
-        session.photograph(ask, show)
+        session.photograph(show)
     except (MachineFault, DiskFault) as fault:
         stopped = str(fault)
     except KeyboardInterrupt:

@@ -109,10 +109,10 @@ def test_errors_of_rays_are_those_predicted(
     calibrated: MachineCalibration, built: BuiltPrototype
 ) -> None:
     rays = calibrated.rays.known
-    errors = ray_errors(calibrated.found, built.machine, rays.frame, rays.sphere)
+    relative, in_run = ray_errors(calibrated.found, built.machine, rays.frame, rays.sphere)
     for found, place, turn in (
-        (errors.relative, rays.relative.place_mm, rays.relative.turn_mrad),
-        (errors.in_run, rays.in_run.place_mm, rays.in_run.turn_mrad),
+        (relative, rays.relative.place_mm, rays.relative.turn_mrad),
+        (in_run, rays.in_run.place_mm, rays.in_run.turn_mrad),
     ):
         for off, sigma in ((place_mm(found), place), (turn_mrad(found), turn)):
             assert np.sqrt((off**2).mean()) < 3 * np.sqrt((sigma**2).mean())

@@ -2,15 +2,16 @@
 
 import shutil
 import socket
-from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from http import HTTPStatus
 from pathlib import Path
 from threading import Thread
+from types import SimpleNamespace
 
 import pytest
 
 from tbcad.app.cli import run as tbcad
 from tbcad.rig.control import klipper_base
+from tbcad.rig.control.klipper import Moonraker
 from tests.rig.control.conftest import Told
 from tests.rig.control.klipper_double import MOTOR
 from tests.rig.control.rig import Rig, until
@@ -63,32 +64,6 @@ def test_server_that_does_not_listen_or_speak_so(klipper_rig: Rig, refused: Told
     assert "it does not speak https: say http://" in refused(words_to(klipper_rig, secure))
 
 
-class Other(BaseHTTPRequestHandler):
-    """A server that is not Moonraker."""
-
-    def log_message(self, format: str, *args: object) -> None:
-        pass
-
-    def do_GET(self) -> None:
-        code, head, body = self.server.says  # type: ignore[attr-defined]
-        self.send_response(code)
-        for name, value in head.items():
-            self.send_header(name, value)
-        self.end_headers()
-        self.wfile.write(body)
-
-
-@pytest.fixture
-def other() -> Iterator[HTTPServer]:
-    server = HTTPServer(("127.0.0.1", 0), Other)
-    thread = Thread(target=server.serve_forever, args=(0.01,), daemon=True)
-    thread.start()
-    yield server
-    server.shutdown()
-    thread.join()
-    server.server_close()
-
-
 @pytest.mark.parametrize(
     ("code", "head", "body", "says"),
     [
@@ -103,15 +78,15 @@ def other() -> Iterator[HTTPServer]:
 def test_server_that_is_not_moonraker(
     klipper_rig: Rig,
     refused: Told,
-    other: HTTPServer,
+    monkeypatch: pytest.MonkeyPatch,
     code: int,
     head: dict[str, str],
     body: bytes,
     says: str,
 ) -> None:
-    other.says = code, head, body  # type: ignore[attr-defined]
-    port = f"moonraker:http://127.0.0.1:{other.server_port}"
-    assert says in refused(words_to(klipper_rig, port))
+    response = SimpleNamespace(status=code, reason=HTTPStatus(code).phrase, getheader=head.get)
+    monkeypatch.setattr(Moonraker, "_answer", lambda *_: (response, body))
+    assert says in refused(klipper_rig.words())
 
 
 def test_key(klipper_rig: Rig, refused: Told, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -148,15 +148,6 @@ def _lens(machine: Machine) -> Floats:
     return np.concatenate([focal, camera.principal, camera.distortion])
 
 
-@dataclass(frozen=True)
-class RayErrors:
-    """Errors of m rays that show the object's centre: place in mm, direction in radians."""
-
-    whole: Floats  # in the frame of the design, (m, 4)
-    relative: Floats  # besides the motion of all rays that fits them best, (m, 4)
-    in_run: Floats  # besides such a motion in each run, (m, 4)
-
-
 def place_mm(errors: Floats) -> Floats:
     """Distances at the object's centre of errors (m, 4), mm, (m,)."""
     return norm(errors[:, :2])
@@ -167,8 +158,12 @@ def turn_mrad(errors: Floats) -> Floats:
     return 1000 * norm(errors[:, 2:])
 
 
-def ray_errors(found: Estimate, truth: Machine, frame: Ints, sphere: Ints) -> RayErrors:
-    """Errors of rays of spheres (m,) in frames (m,), through the pixels that show the centre."""
+def ray_errors(found: Estimate, truth: Machine, frame: Ints, sphere: Ints) -> tuple[Floats, Floats]:
+    """Errors of rays of spheres (m,) in frames (m,), through the pixels that show the centre.
+
+    Place in mm, direction in radians, (m, 4): besides the motion of all rays that fits them best,
+    and besides such a motion in each run.
+    """
     machine = found.machine
     pixel = centre_pixels(machine, frame, sphere)
     _, direction = traced(machine, pixel, frame, sphere)
@@ -176,11 +171,11 @@ def ray_errors(found: Estimate, truth: Machine, frame: Ints, sphere: Ints) -> Ra
     across = perpendicular_axes(direction)
     away = at_plane(start, true_direction, direction), true_direction - direction
     errors = np.concatenate([(across @ one[..., None])[..., 0] for one in away], axis=1).ravel()
-    besides = [
-        errors - motions @ (motion_fit(motions) @ errors)
+    relative, in_run = (
+        (errors - motions @ (motion_fit(motions) @ errors)).reshape(-1, FIGURES)
         for motions in shared_motions(found.prior, frame, direction)
-    ]
-    return RayErrors(*(one.reshape(-1, FIGURES) for one in (errors, *besides)))
+    )
+    return relative, in_run
 
 
 def traced(machine: Machine, pixel: Floats, frame: Ints, sphere: Ints) -> tuple[Floats, Floats]:

@@ -61,7 +61,7 @@ from tests.rig.calibration.machines import (
 
 SIGMA_MM, RADIUS_MM = 0.025, 0.002  # of centres and radii
 STEP = 1e-3  # of the prior standard deviations
-FEW, MANY = 10, 100
+FEW = 10
 MARGIN_PX = 100
 MACHINE = small_machine()
 BALLS = len(MACHINE.radius)
