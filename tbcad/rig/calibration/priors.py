@@ -75,12 +75,15 @@ def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> P
     In the frame of the shell: how its whole place is off is the camera's and the LEDs' error here.
     """
     shift, camera = errors.shell_shift.sigma, _camera(machine, errors, lens_known)
+    warp = errors.warp  # moves and turns each sphere
+    turned = machine.radius / warp.length if warp.length else 0.0 * machine.radius
+    centres = np.hypot(errors.sphere_centre.sigma, warp.spread * np.hypot(1, turned))
     known = camera | {
         Block.CAMERA_TURN: np.hypot(camera[Block.CAMERA_TURN], errors.shell_tilt.sigma),
         Block.PINHOLE: np.hypot(camera[Block.PINHOLE], shift),
         Block.CARRIER: [_growth(errors), 0.0],
         Block.LEDS: math.hypot(math.hypot(shift, LED_MM), shift),
-        Block.CENTRES: _centres(machine, errors)[:, None],
+        Block.CENTRES: centres[:, None],
         Block.RADII: errors.whole_radius.sigma,
     }
     return prior_of(machine, np.zeros(1, dtype=np.int64), known)
@@ -88,13 +91,6 @@ def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> P
 
 def _growth(errors: Errors) -> float:
     return math.hypot(errors.scale_isotropic.mean, errors.scale_isotropic.sigma)
-
-
-def _centres(machine: Machine, errors: Errors) -> Floats:
-    """Of each centre along each axis, mm: its own error, and the warp that moves and turns it."""
-    warp, own = errors.warp, errors.sphere_centre.sigma
-    turned = machine.radius / warp.length if warp.length else 0.0 * machine.radius
-    return np.asarray(np.hypot(own, warp.spread * np.hypot(1, turned)))
 
 
 def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[Block, Any]:

@@ -91,7 +91,10 @@ class Moonraker:
         try:
             response, data = self._answer(method, path, body, limit_s)
         except (OSError, HTTPException, ValueError) as error:
-            raise Unreachable(f"Moonraker: {_reason(error)}") from None
+            kinds = (kind.__name__ for kind in type(error).__mro__)
+            text = next(WORDS["no_answer"][kind] for kind in kinds if kind in WORDS["no_answer"])
+            told = str(text).format(error=error, elsewhere=ELSEWHERE, away=AWAY)
+            raise Unreachable(f"Moonraker: {told}") from None
         try:
             answer = json.loads(data)
         except (ValueError, RecursionError):
@@ -129,12 +132,6 @@ def _error_text(response: HTTPResponse, answer: Any) -> str:
     if (where := response.getheader("Location")) is not None:
         return f"the server sends us to {where}: name that address"
     return f"the server answers {response.status} {response.reason}: {ELSEWHERE}"
-
-
-def _reason(error: Exception) -> str:
-    kinds = (kind.__name__ for kind in type(error).__mro__)
-    text = next(WORDS["no_answer"][kind] for kind in kinds if kind in WORDS["no_answer"])
-    return str(text).format(error=error, elsewhere=ELSEWHERE, away=AWAY)
 
 
 MOTOR = "manual_stepper base"

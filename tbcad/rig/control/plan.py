@@ -4,7 +4,6 @@ Pauses of rotation_plan.nc become questions to the operator, and what it does fo
 done by the run: a light, the camera, the light off again.
 """
 
-import hashlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from tbcad.records.prototype import Prototype
 from tbcad.records.prototype_drive import Phase
 from tbcad.records.run import Frame
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow, StopRow
+from tbcad.rig.runs import export_digests
 
 PROGRAM = "rotation_plan.nc"
 _MOVE = re.compile(r"G1 ([XA])(-?\d+\.\d+)(?: F\d+(?:\.\d+)?)?$")
@@ -152,7 +152,7 @@ def read_control_plan(folder: Path) -> ControlPlan:
     program = read_program(folder)
     angles = _angles(folder, program)
     return ControlPlan(
-        sha256={name: _sha256(folder / name) for name in FILES},
+        sha256=export_digests(folder, FILES),
         size_px=(design.cameras[0].width_px, design.cameras[0].height_px),
         firmware=controller.firmware,
         axis=controller.axis,
@@ -197,16 +197,6 @@ def _angles(folder: Path, program: Program) -> dict[int, float]:
     if len(angles) != len(program.stops):
         raise InputError(f"{path} has another number of stops than {PROGRAM}: {REBUILD}")
     return angles
-
-
-def _sha256(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except FileNotFoundError:
-        raise InputError(f"{path} is not there: {Prototype.MISSING}") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}: {REBUILD}") from None
 
 
 class _Fault(Exception):

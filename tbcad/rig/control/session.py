@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from functools import partial
 from itertools import groupby
 from pathlib import Path
+from time import monotonic
 
 from tbcad.errors import InputError
 from tbcad.options.machines import Ask, Preflight, Show
@@ -36,6 +37,7 @@ from tbcad.rig.control.selection import (
 from tbcad.rig.runs import DiskFault, RunWriter, exposure_of, new_run, resumed_run
 from tbcad.types import Progress
 
+STOPPED = "stopped by the operator"
 MOST_MISSED = 12  # photographs one after the other: the camera is gone, not one photograph
 STRAIGHT, TURNED = "object straight", "object turned by 180 degrees about z"
 
@@ -140,7 +142,30 @@ class Session:
         lights = {one.name: one for one in self._options.phases}
         return light_on(self._base, lights[phase], self._plan.motion.light_s)
 
-    def photograph(self, show: Show) -> None:
+    def photograph(self, show: Show) -> Outcome:
+        """Photograph what remains; then hold the base, switch lights off, close the journal."""
+        begun, before, stopped = monotonic(), len(self._writer.taken), ""
+        try:
+            self._photograph(show)
+        except (MachineFault, DiskFault) as fault:
+            stopped = str(fault)
+        except KeyboardInterrupt:
+            stopped = STOPPED
+        seconds, unsafe, writer = monotonic() - begun, self._base.secure(), self._writer
+        with suppress(DiskFault):
+            writer.log("stopped" if stopped else "finished", reason=stopped)
+        return Outcome(
+            folder=writer.folder,
+            wanted=len(writer.record.frames) * len(writer.record.phases),
+            taken=len(writer.taken),
+            new=len(writer.taken) - before,
+            missed=self._missed,
+            stopped=stopped,
+            unsafe=unsafe,
+            seconds=seconds,
+        )
+
+    def _photograph(self, show: Show) -> None:
         """Home, and photograph what remains; MachineFault or DiskFault: it cannot go on."""
         left = self._options.left(self._writer.taken)
         runs = [list(run) for _, run in groupby(left, lambda one: one.frame.object_turn_deg)]
@@ -199,28 +224,6 @@ class Session:
             now, settings = datetime.now(UTC), photograph.settings
             self._writer.add(exposure_of(frame, phase, image, seconds, now, settings), shot.data)
             self._in_row = 0
-
-    def finish(self, stopped: str, seconds: float, before: int) -> Outcome:
-        """Hold the base, switch lights off, close the journal."""
-        unsafe = self._base.secure()
-        writer = self._writer
-        with suppress(DiskFault):
-            writer.log("stopped" if stopped else "finished", reason=stopped)
-        return Outcome(
-            folder=writer.folder,
-            wanted=len(writer.record.frames) * len(writer.record.phases),
-            taken=len(writer.taken),
-            new=len(writer.taken) - before,
-            missed=self._missed,
-            stopped=stopped,
-            unsafe=unsafe,
-            seconds=seconds,
-        )
-
-    @property
-    def taken(self) -> int:
-        """Number of photographs that are there."""
-        return len(self._writer.taken)
 
 
 def _turned(remaining: list[Shots]) -> bool:

@@ -111,7 +111,7 @@ def prepared_merge(folder: Path, calibration: Path, exports: Path, options: Merg
     InputError: one cannot be read, they do not belong together, or nothing was photographed.
     """
     run, export = read_run(folder), read_export(exports)
-    check_same_export(run, exports)
+    check_same_export(folder, run.record, exports)
     parts = run.record.machines
     read = [read_machine(calibration / name / RECORD) for name in parts]
     machines = [
@@ -138,7 +138,13 @@ def _halves(
 ) -> list[HalfMerge]:
     """What one machine has photographed: a prototype for both cameras, a shell's camera for one."""
     machine, frames = calibrated
-    _check_size(run, machine, calibration)
+    record, camera = run.record, machine.camera
+    if (record.width_px, record.height_px) != (camera.width_px, camera.height_px):
+        raise InputError(
+            f"{run.folder} has photographs of {record.width_px} x {record.height_px} pixels, the "
+            f"camera of {calibration} {camera.width_px} x {camera.height_px}: calibrate with this "
+            "run's camera"
+        )
     plan = plan_of(export, run.record.geometry, run.record.frames)
     corrected, exposure = corrections(options, machine.camera), common_exposure(run)
     known, stops = stops_known(plan, frames), range(len(plan.angle))
@@ -158,16 +164,6 @@ def _halves(
 def _photographed(half: HalfMerge) -> bool:
     run, frames = half.photographs.run, half.photographs.frames
     return any(frame is not None and run.exposure(frame, LIT) is not None for frame in frames)
-
-
-def _check_size(run: Run, machine: Machine, calibration: Path) -> None:
-    record, camera = run.record, machine.camera
-    if (record.width_px, record.height_px) != (camera.width_px, camera.height_px):
-        raise InputError(
-            f"{run.folder} has photographs of {record.width_px} x {record.height_px} pixels, the "
-            f"camera of {calibration} {camera.width_px} x {camera.height_px}: calibrate with this "
-            "run's camera"
-        )
 
 
 def _facts(

@@ -1,6 +1,5 @@
 """Simulate the run of a random build: all photographs, as files of a run's folder."""
 
-import hashlib
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -43,7 +42,7 @@ from tbcad.rig.machine.designed import (
 )
 from tbcad.rig.machine.machine import truth_file, write_machine
 from tbcad.rig.machine.shells import perfect_half, random_half, shell_frame
-from tbcad.rig.runs import exposure_of, frames_of
+from tbcad.rig.runs import export_digests, exposure_of, frames_of
 from tbcad.rig.simulated_run.led_light import Occluders, stage_scene
 from tbcad.rig.simulated_run.photographs import (
     EXPOSURE_S,
@@ -210,10 +209,7 @@ def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Pat
     camera, frames = runs[0].built.machine.camera, tuple(f for run in runs for f in run.frames)
     geometry: Geometry = "prototype" if len(runs) == 1 else "shell"
     return RunRecord(
-        export_sha256={
-            name: hashlib.sha256((export / name).read_bytes()).hexdigest()
-            for name in DEPENDS_ON[geometry]
-        },
+        export_sha256=export_digests(export, DEPENDS_ON[geometry]),
         source="simulated",
         camera=CAMERA,
         width_px=camera.width_px,

@@ -58,7 +58,17 @@ def reflections(centre: Floats, radius: Floats, light: Floats, pinhole: Floats) 
         )
         if length.max(initial=0) < CONVERGED:
             break
-    return _differentiated(centre, radius, light, pinhole, normal)
+    (by_light, by_pinhole), turned, _ = _law(centre, radius, light, pinhole, normal)
+    across = np.eye(3) - normal[:, :, None] * normal[:, None]
+    moved = radius[:, None, None] * np.linalg.solve(turned, across)
+    with_point = np.eye(3) - moved @ (by_light + by_pinhole)
+    return Reflections(
+        point=centre + radius[:, None] * normal,
+        by_centre=with_point,
+        by_radius=(with_point @ normal[..., None])[..., 0],
+        by_light=moved @ by_light,
+        by_pinhole=moved @ by_pinhole,
+    )
 
 
 def _law(
@@ -77,22 +87,6 @@ def _law(
     along = dot(normal, total)[:, None, None]
     turned = radius[:, None, None] * across @ (bends[0] + bends[1]) @ across + along * np.eye(3)
     return (bends[0], bends[1]), turned, (across @ total[..., None])[..., 0]
-
-
-def _differentiated(
-    centre: Floats, radius: Floats, light: Floats, pinhole: Floats, normal: Floats
-) -> Reflections:
-    (by_light, by_pinhole), turned, _ = _law(centre, radius, light, pinhole, normal)
-    across = np.eye(3) - normal[:, :, None] * normal[:, None]
-    moved = radius[:, None, None] * np.linalg.solve(turned, across)
-    with_point = np.eye(3) - moved @ (by_light + by_pinhole)
-    return Reflections(
-        point=centre + radius[:, None] * normal,
-        by_centre=with_point,
-        by_radius=(with_point @ normal[..., None])[..., 0],
-        by_light=moved @ by_light,
-        by_pinhole=moved @ by_pinhole,
-    )
 
 
 def projection(camera: LensCamera, image: Floats) -> tuple[Floats, Floats, Floats]:

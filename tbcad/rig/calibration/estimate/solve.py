@@ -88,7 +88,9 @@ def estimate(
     problem = _Problem(prior, highlights, every, progress)
     values = np.zeros(len(prior.free)) if start is None else start
     values, steps = _minimum(problem, values, robust=True)
-    problem = replace(problem, noise=_robust_noise(problem, values))
+    # The median hardly changes by outliers; squares have one of 2 log 2.
+    middle = float(np.median(_squares(problem, values)))
+    problem = replace(problem, noise=max(1.0, math.sqrt(middle / (2 * math.log(2)))))
     freedom = 0.0
     for _ in range(MAX_ROUNDS):
         problem = replace(problem, used=_near(problem, values))
@@ -188,12 +190,6 @@ def _factor(information: csc_array) -> SuperLU:
 def _squares(problem: _Problem, values: Floats) -> Floats:
     residual, _ = problem.at(values)
     return np.asarray((residual**2).sum(axis=1) / problem.highlights.sigma**2)
-
-
-def _robust_noise(problem: _Problem, values: Floats) -> float:
-    """Noise by the median, which outliers hardly change; squares have a median of 2 log 2."""
-    median = float(np.median(_squares(problem, values)))
-    return max(1.0, math.sqrt(median / (2 * math.log(2))))
 
 
 def _near(problem: _Problem, values: Floats) -> Bools:

@@ -89,10 +89,7 @@ def parse_dictionary(text: str) -> str:
 
 def find_corners(grey: Any, board: Board) -> BoardCorners | None:
     """Find at least `MIN_CORNERS` corners between four squares in grey, uint8, (h, w), or None."""
-    if board.dictionary is not None:
-        return _charuco(grey, board)
-    grid = _whole(grey, board.squares)
-    return None if grid is None else _refined(grey, grid, board.size_mm)
+    return (_checkerboard if board.dictionary is None else _charuco)(grey, board)
 
 
 def _charuco(grey: Any, board: Board) -> BoardCorners | None:
@@ -112,35 +109,23 @@ def _charuco(grey: Any, board: Board) -> BoardCorners | None:
     return None
 
 
-def _whole(grey: Any, squares: tuple[int, int]) -> Any:
-    """A whole checkerboard's corners, roughly, (rows, columns, 2); None where it is not found."""
-    cv2, (columns, rows) = cv(), (squares[0] - 1, squares[1] - 1)
-    flags = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_NORMALIZE_IMAGE
-    seen, corners = cv2.findChessboardCornersSB(grey, (columns, rows), flags=flags)
-    return np.reshape(corners, (rows, columns, 2)) if seen else None
-
-
-def _spacing(grid: Any) -> float:
-    return float(min(np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1)))
-
-
-def _places(grid: Any) -> Any:
-    rows, columns = grid.shape[:2]
-    return np.mgrid[0:columns, 0:rows].T.reshape(-1, 2).astype(np.float32)
-
-
-def _refined(grey: Any, grid: Any, size_mm: float) -> BoardCorners | None:
-    """Corners to a fraction of a pixel, but for those whose window leaves the picture.
+def _checkerboard(grey: Any, board: Board) -> BoardCorners | None:
+    """Of a whole board, to a fraction of a pixel, but for corners whose window leaves the picture.
 
     The window holds one corner only: OpenCV's own example takes 11 pixels on each side, which
     reaches the next corner of a small board and moves to it.
     """
-    cv2 = cv()
-    window = int(np.clip(_spacing(grid) * WINDOW_SHARE, 2, MAX_WINDOW))
-    rough = np.ascontiguousarray(grid, np.float32).reshape(-1, 1, 2)
+    cv2, (columns, rows) = cv(), (board.squares[0] - 1, board.squares[1] - 1)
+    flags = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_NORMALIZE_IMAGE
+    seen, rough = cv2.findChessboardCornersSB(grey, (columns, rows), flags=flags)
+    if not seen:
+        return None
+    grid = np.reshape(rough, (rows, columns, 2))
+    spacing = min(np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1))
+    window = int(np.clip(spacing * WINDOW_SHARE, 2, MAX_WINDOW))
     stop = cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, STEPS, REFINED_PX
     pixels = cv2.cornerSubPix(grey, rough, (window, window), (-1, -1), stop).reshape(-1, 2)
     inside = (pixels > window) & (pixels < np.array(grey.shape[::-1]) - 1 - window)
-    places = np.pad(size_mm * _places(grid), ((0, 0), (0, 1)))
-    corners = BoardCorners(places, pixels).but(~inside.all(axis=1))
+    places = board.size_mm * np.mgrid[0:columns, 0:rows].T.reshape(-1, 2).astype(np.float32)
+    corners = BoardCorners(np.pad(places, ((0, 0), (0, 1))), pixels).but(~inside.all(axis=1))
     return corners if len(corners.pixels) >= MIN_CORNERS else None

@@ -1,5 +1,6 @@
 """Plots of a calibration: residuals, their distribution, spheres, and rays."""
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -155,7 +156,7 @@ def _panel(axes: "Axes", kind: Kind) -> None:
         elinewidth=0.8,
         label=kind.name,
     )
-    axes.set_title(_wrapped(f"{kind.name}, {kind.unit}"), fontsize=7)
+    axes.set_title(textwrap.fill(f"{kind.name}, {kind.unit}", TITLE_LINE), fontsize=7)
     axes.set_xlabel("injected", fontsize=7)
     axes.set_ylabel("recovered", fontsize=7)
     axes.tick_params(labelsize=6)
@@ -179,10 +180,3 @@ def _distribution(axes: "Axes", kinds: tuple[Kind, ...]) -> None:
     axes.set_title("errors over their deviations,\neach kind alike; normal law", fontsize=7)
     axes.tick_params(labelsize=6)
     axes.grid(True, alpha=0.25)
-
-
-def _wrapped(title: str) -> str:
-    if len(title) <= TITLE_LINE:
-        return title
-    middle = title.rfind(" ", 0, TITLE_LINE)
-    return f"{title[:middle]}\n{title[middle + 1 :]}"
