@@ -15,9 +15,10 @@ from tbcad.light.simulate.prototype.ball_rays import photographed_pixels
 from tbcad.light.simulate.prototype.run import Plan, PrototypeRun
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.records.run import LIT, PHOTOGRAPHS, RECORD, Exposure, Frame, RunRecord, exposure_name
+from tbcad.records.run import LIT, PHOTOGRAPHS, RECORD, Frame, RunRecord, exposure_name
 from tbcad.rig.machine.designed import machine_runs
 from tbcad.rig.machine.machine import Machine
+from tbcad.rig.runs import exposure_of
 from tbcad.types import Bytes
 
 Change = Callable[[np.ndarray, Frame, str], np.ndarray]
@@ -88,17 +89,9 @@ def write_exposure(images: Path, frame: Frame, phase: str, image: np.ndarray, fi
     written, data = cv2.imencode(Path(file).suffix, image[..., ::-1])
     assert written
     (images / file).write_bytes(data.tobytes())
-    Exposure(
-        frame=frame,
-        phase=phase,
-        file=file,
-        sha256=digest(images / file),
-        width_px=image.shape[1],
-        height_px=image.shape[0],
-        exposure_s=EXPOSURE_S,
-        taken=TAKEN,
-        settings={},
-    ).write((images / file).with_suffix(".json"))
+    told = data.tobytes(), Path(file).suffix, (image.shape[1], image.shape[0])
+    sidecar = exposure_of(frame, phase, told, EXPOSURE_S, TAKEN)
+    sidecar.write((images / file).with_suffix(".json"))
 
 
 def digest(path: Path) -> str:

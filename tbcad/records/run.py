@@ -31,7 +31,6 @@ DARK, LIT, DARK_LIT = "dark", "lit", "dark_lit"
 both differ.
 """
 SAME_TIME = 0.02  # relative: what is set as 1/60 is reported as 0.0167
-MOST_SCALED = 2.0  # factor of a dark photograph: more enlarges its noise beyond what it is worth
 
 PhaseName = Annotated[str, Field(pattern=r"^(dark|dark_lit|lit|led_[1-9]\d?)$")]
 Setting = str | int | float | bool
@@ -69,17 +68,12 @@ class PhaseTimes:
         return (*names[:at], DARK_LIT, *names[at:])
 
 
-def dark_factor(dark_s: float | None, exposure_s: float | None) -> float | None:
-    """Factor that brings a dark photograph from its exposure time to another, s; None: not known.
+def same_exposure(one_s: float | None, other_s: float | None) -> bool:
+    """Whether two exposure times, s, are the same as far as they are known.
 
-    Dark signal and stray light grow with the time; so do noise and rounding when they are scaled.
-    One where the times are the same or not known; None where the dark photograph is too short to be
-    subtracted.
+    A dark photograph is subtracted from one of its own exposure only.
     """
-    if dark_s is None or exposure_s is None or abs(exposure_s / dark_s - 1) <= SAME_TIME:
-        return 1.0
-    ratio = exposure_s / dark_s
-    return ratio if ratio <= MOST_SCALED else None
+    return one_s is None or other_s is None or abs(other_s / one_s - 1) <= SAME_TIME
 
 
 class Frame(RecordSection):

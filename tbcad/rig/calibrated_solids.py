@@ -2,29 +2,30 @@
 
 import json
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
 from scipy.spatial.transform import Rotation
 
 from tbcad.cad.formats.assembly import ColouredSolid, SolidGroup, write_assembly
 from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.kernel.solids import common, one_solid, sphere
+from tbcad.common.figure_files import figure_file
 from tbcad.common.results import Table
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import mirror_ids
 from tbcad.core.optics.windows import cell_windows
 from tbcad.errors import InputError
-from tbcad.light.simulate.image_files import write_images
 from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, read_plan
 from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.records.tables import RayRow
 from tbcad.rig.machine.designed import machine_runs, stops_known
 from tbcad.rig.machine.machine import RECORD, Machine, read_machine
-from tbcad.types import Bytes, Floats
+from tbcad.types import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SAME_MM = 1e-6  # centres and radii of a ball's front and body; a cap's are apart
 UM_PER_MM = 1000.0
@@ -38,9 +39,7 @@ COLUMNS = (
     *("ball", "x_mm", "y_mm", "z_mm", "radius_mm"),
     *("dx_um", "dy_um", "dz_um", "distance_um", "radius_error_um", "colour"),
 )
-# Of the legend, pixels.
-WIDTH, HEIGHT, EDGE, BAR, TICK, FONT = 640, 96, 40, 28, 6, 16
-TICKS = 5
+LEGEND_INCHES, SHADES = (6.4, 1.0), 560
 CALIBRATE = "calibrate again with tbcad calibrate"
 AXES = 2  # of the plane at the object in which a ray may be off
 PERCENT = 95.0
@@ -120,7 +119,7 @@ def as_built(calibration: Path, exports: Path, folder: Path) -> dict[str, Any]:
     found = deviations(machine, plan)
     write_assembly(folder / STEP, "prototype_as_built", [ball_group(machine, plan, found)])
     write_table(folder / TABLE, COLUMNS, _rows(machine, found))
-    write_images({folder / LEGEND: legend(found.scale_um)})
+    (folder / LEGEND).write_bytes(legend(found.scale_um))
     record = {
         "schema": SCHEMA,
         "calibration": str(calibration),
@@ -136,21 +135,16 @@ def as_built(calibration: Path, exports: Path, folder: Path) -> dict[str, Any]:
     return record
 
 
-def legend(scale_um: float) -> Bytes:
-    """A picture of the colours from 0 to the end of the scale, (h, w, 3)."""
-    picture = np.full((HEIGHT, WIDTH, 3), 255, dtype=np.uint8)
-    share = np.linspace(0, 1, WIDTH - 2 * EDGE)
-    picture[EDGE // 2 : EDGE // 2 + BAR, EDGE:-EDGE] = np.rint(255 * colours(share))
-    image = Image.fromarray(picture)
-    draw, font = ImageDraw.Draw(image), ImageFont.load_default(FONT)
-    under = EDGE // 2 + BAR
-    for part in np.linspace(0, 1, TICKS + 1).tolist():
-        x = EDGE + part * (WIDTH - 2 * EDGE - 1)
-        draw.line([(x, under), (x, under + TICK)], fill="black")
-        draw.text((x, under + TICK), f"{part * scale_um:g}", fill="black", font=font, anchor="ma")
-    name = "centre off the designed base, micrometres"
-    draw.text((WIDTH / 2, HEIGHT - FONT), name, fill="black", font=font, anchor="ma")
-    return np.asarray(image)
+def legend(scale_um: float) -> bytes:
+    """A picture of the colours from 0 to the end of the scale, PNG."""
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        shades = colours(np.linspace(0, 1, SHADES))[None]
+        axes.imshow(shades, extent=(0, scale_um, 0, 1), aspect="auto")
+        axes.set(yticks=[], xlabel="centre off the designed base, micrometres")
+
+    return figure_file(draw, LEGEND_INCHES)
 
 
 def _rows(machine: Machine, found: Deviations) -> list[Row]:
@@ -195,28 +189,25 @@ def as_built_tolerance(
     """
     export = read_export(exports)
     plan, (machine, frames) = read_plan(export), read_machine(calibration / RECORD)
-    runs, known = machine_runs(export, plan, machine, frames), stops_known(plan, frames)
-    names = [mirror_ids(run.reflector.camera_id, len(run.reflector)) for run in runs]
-    rays = {ray.mirror: ray for ray in RayRow.read(calibration)}
-    covered = np.concatenate([*map(_coverage, runs)])
-    coverage = dict(zip(chain(*names), covered.tolist(), strict=True))
-    seen = np.concatenate([known[half, plan.stop[half]] for half in range(len(runs))])
-    every = zip(chain(*names), seen.tolist(), strict=True)
-    ids = [name for name, calibrated in every if calibrated and name in rays]
-    if not ids:
+    rays, known = {ray.mirror: ray for ray in RayRow.read(calibration)}, stops_known(plan, frames)
+    records, absent = list[dict[str, Any]](), list[str]()
+    for half, run in enumerate(machine_runs(export, plan, machine, frames)):
+        names = mirror_ids(run.reflector.camera_id, len(run.reflector))
+        calibrated = known[half, plan.stop[half]]
+        for name, shown_mm, seen in zip(names, _coverage(run).tolist(), calibrated, strict=True):
+            if not seen or name not in rays:
+                absent.append(name)
+                continue
+            figures = {figure: getattr(rays[name], figure) for figure in RAY_FIGURES}
+            records.append({"mirror": name, "coverage_mm": shown_mm, **figures})
+    if not records:
         raise InputError(f"{calibration / RayRow.FILE} names no mirror of {exports}: {CALIBRATE}")
-    records = [
-        {"mirror": name, "coverage_mm": coverage[name]}
-        | {figure: getattr(rays[name], figure) for figure in RAY_FIGURES}
-        for name in ids
-    ]
     mirrors = Table.of_records("as-built", records)
     shown, place = mirrors.numbers("coverage_mm"), mirrors.numbers("sigma_mm")
     random, size = np.random.default_rng(seed), (len(place), AXES)
     lost = (2 * norm(random.standard_normal(size)) * place / np.sqrt(AXES) for _ in range(builds))
     worst = np.array([(shown - one).min() for one in lost])
-    absent = tuple(sorted({*coverage} - {*ids}))
-    return AsBuiltTolerance(export.capture_mm, mirrors, absent, worst)
+    return AsBuiltTolerance(export.capture_mm, mirrors, tuple(absent), worst)
 
 
 def tolerance_record(found: AsBuiltTolerance, builds: int, seed: int) -> dict[str, Any]:

@@ -9,7 +9,7 @@ that is taken again.
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -24,6 +24,7 @@ from tbcad.cad.formats.pictures import PICTURE_SUFFIXES, picture_of, read_pictur
 from tbcad.cad.formats.pixels import Picture
 from tbcad.common.atomic_files import InFolder
 from tbcad.errors import InputError
+from tbcad.records.prototype import Prototype
 from tbcad.records.run import (
     JOURNAL,
     PHOTOGRAPHS,
@@ -31,6 +32,7 @@ from tbcad.records.run import (
     Exposure,
     Frame,
     RunRecord,
+    Setting,
     exposure_name,
     read_record,
 )
@@ -150,16 +152,50 @@ def _exposure(folder: Path, record: RunRecord, frame: Frame, phase: str) -> Expo
     return found
 
 
-def check_same_export(run: Run, exports: Path) -> None:
-    """Refuse an export whose files are not those that the run began with; InputError: which."""
-    for name, digest in run.record.export_sha256.items():
-        path = exports / name
-        if not path.is_file():
-            raise InputError(f"{path} is not there, but {run.folder} was photographed with it")
-        if hashlib.sha256(path.read_bytes()).hexdigest() != digest:
+def exposure_of(
+    frame: Frame,
+    phase: str,
+    image: tuple[bytes, str, tuple[int, int]],
+    exposure_s: float | None,
+    taken: datetime,
+    settings: Mapping[str, Setting] | None = None,
+) -> Exposure:
+    """The sidecar of a photograph: its file's bytes and suffix, and columns and rows."""
+    data, suffix, (width, height) = image
+    return Exposure(
+        frame=frame,
+        phase=phase,
+        file=exposure_name(frame, phase) + suffix,
+        sha256=hashlib.sha256(data).hexdigest(),
+        width_px=width,
+        height_px=height,
+        exposure_s=exposure_s,
+        taken=taken,
+        settings=dict(settings or {}),
+    )
+
+
+def export_digests(exports: Path, names: Iterable[str]) -> dict[str, str]:
+    """sha256 of files of an export by name; InputError: one is not there, or cannot be read."""
+    digests = {}
+    for name in names:
+        try:
+            digests[name] = hashlib.sha256((exports / name).read_bytes()).hexdigest()
+        except FileNotFoundError:
+            raise InputError(f"{exports / name} is not there: {Prototype.MISSING}") from None
+        except OSError as error:
+            raise InputError(f"{exports / name} cannot be read: {error.strerror}") from None
+    return digests
+
+
+def check_same_export(folder: Path, record: RunRecord, exports: Path) -> None:
+    """Refuse an export whose files are not those that a run began with; InputError: which."""
+    found = export_digests(exports, record.export_sha256)
+    for name, digest in record.export_sha256.items():
+        if found[name] != digest:
             raise InputError(
-                f"{path} is not the file that {run.folder} was photographed with: name the export "
-                "of that run with --exports"
+                f"{exports / name} is not the file that {folder} was photographed with: name the "
+                "export of that run"
             )
 
 

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import diags_array
 
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
@@ -13,13 +14,19 @@ from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.run import Frame, Geometry
 from tbcad.records.tables import StopRow
 from tbcad.rig.calibration.detection.detection import Detection
-from tbcad.rig.calibration.estimate.parameters import Block, Prior
+from tbcad.rig.calibration.estimate.parameters import Of, Prior
 from tbcad.rig.calibration.estimate.solve import Estimate, estimate
 from tbcad.rig.calibration.intrinsics.lens import CalibratedLens
 from tbcad.rig.calibration.priors import Measured, prototype_prior, shell_prior
-from tbcad.rig.calibration.uncertainty import RayUncertainty, ray_slopes, ray_uncertainty
+from tbcad.rig.calibration.uncertainty import (
+    FIGURES,
+    PLACES,
+    RayUncertainty,
+    known_rays,
+    ray_slopes,
+)
 from tbcad.rig.machine.designed import designed_prototype, is_cap
-from tbcad.rig.machine.machine import Highlights, Machine
+from tbcad.rig.machine.machine import Machine
 from tbcad.rig.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.prototype.windows import read_wind_up
@@ -31,16 +38,29 @@ HALVES = {"angles": "frame", "LEDs": "led"}
 
 @dataclass(frozen=True)
 class Setup:
-    """A machine before it is calibrated: a prototype, or of a shell see `ShellSetup`."""
+    """A machine before it is calibrated: a prototype, or one camera of a shell.
+
+    Of a shell its mirrors are the balls of its plan.
+    """
 
     export: ExportedDesign
     plan: Plan
     frames: tuple[Frame, ...]  # that are photographed, in the order of the machine's
     designed: Machine  # the machine, at the angles of these frames
     lens: CalibratedLens | None = None  # of its camera, where it is known
+    geometry: Geometry = "prototype"
 
     def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
-        """Means and standard deviations by its process and by radii that are measured."""
+        """Means and standard deviations by its process and by radii that are measured.
+
+        InputError: radii of a shell are given as measured, which only balls and caps can be.
+        """
+        if self.geometry == "shell":
+            if measured:
+                raise InputError(
+                    "--measured is of balls and caps, and a shell has none: leave it out"
+                )
+            return shell_prior(self.designed, errors, self.lens is not None)
         home = Prototype.read(self.export.folder / NAME).home
         stop = np.array([frame.stop - 1 for frame in self.frames])
         known = (self.export.folder / StopRow.FILE).is_file()  # not of exports by old versions
@@ -57,20 +77,6 @@ class Setup:
         )
 
 
-@dataclass(frozen=True)
-class ShellSetup(Setup):
-    """One camera of a shell before it is calibrated: its mirrors are the balls of its plan."""
-
-    def prior(self, errors: Errors, measured: Measured = ()) -> Prior:
-        """Means and standard deviations by its process.
-
-        InputError: radii are given as measured, which only balls and caps can be.
-        """
-        if measured:
-            raise InputError("--measured is of balls and caps, and a shell has none: leave it out")
-        return shell_prior(self.designed, errors, self.lens is not None)
-
-
 def prepared_setup(
     export: ExportedDesign,
     frames: tuple[Frame, ...],
@@ -82,7 +88,6 @@ def prepared_setup(
 
     InputError: the export has no prototype or LEDs, or another picture's size than the run.
     """
-    kind: type[Setup] = Setup if geometry == "prototype" else ShellSetup
     plan = plan_of(export, geometry, frames)
     machine = (
         designed_prototype(export, plan)
@@ -103,7 +108,8 @@ def prepared_setup(
         )
     angle = np.radians([frame.base_angle_deg for frame in frames])
     camera = machine.camera if lens is None else lens.on(machine.camera)
-    return kind(export, plan, frames, replace(machine, angle=angle, camera=camera), lens)
+    machine = replace(machine, angle=angle, camera=camera)
+    return Setup(export, plan, frames, machine, lens, geometry)
 
 
 @dataclass(frozen=True)
@@ -133,7 +139,7 @@ def calibrate(
     found = estimate(prior, detection.highlights, progress)
     progress("uncertainty of the rays")
     ids, absent, frame, sphere = ray_places(setup)
-    known = ray_uncertainty(found, frame, sphere)
+    known = known_rays(prior, found.values, found.covariance, frame, sphere)
     halves = cross_validation(found, frame, sphere, progress)
     return MachineCalibration(setup, detection, found, MirrorRays(ids, known, absent), halves)
 
@@ -179,31 +185,20 @@ def _compared(
     found: Estimate, by: str, parts: list[Bools], rays: tuple[Ints, Ints], progress: Progress
 ) -> HalvesRecord:
     progress(f"halves with {by} apart")
-    one, other = (estimate(found.prior, _subset(found, part), start=found.values) for part in parts)
+    h = found.highlights
+    measured = replace(h, sigma=h.sigma * found.noise_factor)
+    one, other = (estimate(found.prior, measured.only(part), start=found.values) for part in parts)
     slopes, _ = ray_slopes(found.prior, found.values, *rays)
-    slopes = slopes[:, _static(found)]
-    inverses = [np.linalg.inv(half.information.toarray()) for half in (one, other)]
-    both = inverses[0] @ inverses[1]
-    spread = (inverses[0] + inverses[1] - both - both.T)[np.ix_(_static(found), _static(found))]
-    difference = slopes @ (one.values - other.values)[_static(found)]
-    places = slopes.toarray().reshape(-1, 4, slopes.shape[1])[:, :2]
-    expected = np.einsum("mdq,qr,mdr->", places, spread, places, optimize=True)
-    squares = difference.reshape(-1, 4)[:, :2] ** 2
-    count = len(squares)
+    # Parameters of single frames are left out: a half sees every other frame.
+    static = diags_array((~found.prior.is_of(Of.FRAME)).astype(np.float64))
+    places = slopes[np.arange(slopes.shape[0]) % FIGURES < PLACES] @ static
+    spreads = [places @ half.covariance for half in (one, other)]
+    own = sum(float(places.multiply(spread).sum()) for spread in spreads)
+    expected = own - 2 * float((spreads[0] * spreads[1]).sum())
+    difference, count = places @ (one.values - other.values), len(rays[0])
     return HalvesRecord(
         apart=by,
         highlights=(len(one.highlights), len(other.highlights)),
-        found_mm=math.sqrt(float(squares.sum()) / count),
-        expected_mm=math.sqrt(float(expected) / count),
+        found_mm=math.sqrt(float(difference @ difference) / count),
+        expected_mm=math.sqrt(expected / count),
     )
-
-
-def _static(found: Estimate) -> Ints:
-    """Free parameters that are not of single frames, of which a half sees every other one."""
-    return np.flatnonzero(~found.prior.is_of(Block.ANGLES, Block.RUNOUT))
-
-
-def _subset(found: Estimate, part: Bools) -> Highlights:
-    h = found.highlights
-    sigma = h.sigma[part] * found.noise_factor
-    return Highlights(h.frame[part], h.sphere[part], h.led[part], h.pixel[part], sigma)

@@ -6,29 +6,27 @@ is moved once more, until none gets better.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from tbcad.core.geometry.vectors import norm
+from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.leds import POCKET_PLAY_MM, hidden_by_object, pillar_radius
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Block, Prior
-from tbcad.rig.calibration.priors import shell_prior
+from tbcad.rig.calibration.estimate.parameters import Block, Prior, prior_of
 from tbcad.rig.calibration.uncertainty import SPHERE_MM, ray_slopes
 from tbcad.rig.machine.designed import designed_shell, read_leds
 from tbcad.rig.machine.machine import Machine
-from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.types import Floats, Progress
 
 RINGS, AZIMUTHS, HEIGHTS = 2, 18, 5  # of the places that are tried; azimuths over half a turn
 NUMBERS = (4, 6, 8, 16)
 USUAL_PX, USUAL_PROCESS = 0.05, "fdm"
 FREE, PRIOR_MM = np.inf, 0.025
-HALF_TURN = np.array([-1.0, -1.0, 1.0])
 MAX_ROUNDS = 6
 DIGITS = 2  # of places in mm
 
@@ -189,9 +187,8 @@ def shell_information(export: ExportedDesign, leds: Floats) -> SphereInformation
 
 def only_spheres(machine: Machine) -> Prior:
     """A prior of deviations of 1 mm of centres and radii, all else known."""
-    prior, free = shell_prior(machine, Errors()), (Block.CENTRES, Block.RADII)
-    sigma = {block: np.full(one.shape, float(block in free)) for block, one in prior.sigma.items()}
-    return replace(prior, sigma=sigma)
+    still = np.zeros(1, dtype=np.int64)
+    return prior_of(machine, still, {Block.CENTRES: 1.0, Block.RADII: 1.0})
 
 
 def layout_cost(information: SphereInformation, leds: list[int]) -> float:

@@ -7,12 +7,13 @@ process says is a judgement, below.
 import math
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
-from tbcad.rig.calibration.estimate.parameters import Block, Prior
+from tbcad.rig.calibration.estimate.parameters import Block, Prior, prior_of
 from tbcad.rig.machine.designed import LED_MM
 from tbcad.rig.machine.machine import Machine
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
@@ -53,21 +54,19 @@ def prototype_prior(
     arm = norm(machine.centre - body_centre)
     tilted = np.where(is_cap, arm * errors.cap_tilt.sigma, 0.0)
     centres = np.hypot(errors.seat.sigma, tilted)
-    growth = math.hypot(errors.scale_isotropic.mean, errors.scale_isotropic.sigma)
-    frames = len(machine.angle)
     offset = math.hypot(zero_error / math.sqrt(3), errors.rotation_angle.sigma)
-    sigma = _camera(machine, errors, lens_known) | {
-        Block.TILT: np.full(2, errors.axis_tilt.sigma),
-        Block.AXIS_POINT: np.full(2, errors.shell_shift.sigma),
-        Block.OFFSET: np.full(int(series.max()) + 1, offset),
-        Block.CARRIER: np.array([growth, errors.shell_shift.sigma]),
-        Block.LEDS: np.full(machine.leds.shape, math.hypot(errors.shell_shift.sigma, LED_MM)),
-        Block.CENTRES: np.repeat(centres[:, None], 3, axis=1),
+    known = _camera(machine, errors, lens_known) | {
+        Block.TILT: errors.axis_tilt.sigma,
+        Block.AXIS_POINT: errors.shell_shift.sigma,
+        Block.OFFSET: offset,
+        Block.CARRIER: [_growth(errors), errors.shell_shift.sigma],
+        Block.LEDS: math.hypot(errors.shell_shift.sigma, LED_MM),
+        Block.CENTRES: centres[:, None],
         Block.RADII: radii,
-        Block.ANGLES: np.full(frames, errors.rotation_angle.sigma),
-        Block.RUNOUT: np.full((frames, 2), errors.axis_runout.sigma),
+        Block.ANGLES: errors.rotation_angle.sigma,
+        Block.RUNOUT: errors.axis_runout.sigma,
     }
-    return Prior(replace(machine, radius=radius), series, sigma)
+    return prior_of(replace(machine, radius=radius), series, known)
 
 
 def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> Prior:
@@ -75,33 +74,26 @@ def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> P
 
     In the frame of the shell: how its whole place is off is the camera's and the LEDs' error here.
     """
-    spheres, shift = len(machine.radius), errors.shell_shift.sigma
-    camera = _camera(machine, errors, lens_known)
-    camera[Block.CAMERA_TURN] = np.hypot(camera[Block.CAMERA_TURN], errors.shell_tilt.sigma)
-    camera[Block.PINHOLE] = np.hypot(camera[Block.PINHOLE], shift)
-    growth = math.hypot(errors.scale_isotropic.mean, errors.scale_isotropic.sigma)
-    sigma = camera | {
-        Block.TILT: np.zeros(2),
-        Block.AXIS_POINT: np.zeros(2),
-        Block.OFFSET: np.zeros(1),
-        Block.CARRIER: np.array([growth, 0.0]),
-        Block.LEDS: np.full(machine.leds.shape, math.hypot(math.hypot(shift, LED_MM), shift)),
-        Block.CENTRES: np.repeat(_centres(machine, errors)[:, None], 3, axis=1),
-        Block.RADII: np.full(spheres, errors.whole_radius.sigma),
-        Block.ANGLES: np.zeros(1),
-        Block.RUNOUT: np.zeros((1, 2)),
-    }
-    return Prior(machine, np.zeros(1, dtype=np.int64), sigma)
-
-
-def _centres(machine: Machine, errors: Errors) -> Floats:
-    """Of each centre along each axis, mm: its own error, and the warp that moves and turns it."""
-    warp, own = errors.warp, errors.sphere_centre.sigma
+    shift, camera = errors.shell_shift.sigma, _camera(machine, errors, lens_known)
+    warp = errors.warp  # moves and turns each sphere
     turned = machine.radius / warp.length if warp.length else 0.0 * machine.radius
-    return np.asarray(np.hypot(own, warp.spread * np.hypot(1, turned)))
+    centres = np.hypot(errors.sphere_centre.sigma, warp.spread * np.hypot(1, turned))
+    known = camera | {
+        Block.CAMERA_TURN: np.hypot(camera[Block.CAMERA_TURN], errors.shell_tilt.sigma),
+        Block.PINHOLE: np.hypot(camera[Block.PINHOLE], shift),
+        Block.CARRIER: [_growth(errors), 0.0],
+        Block.LEDS: math.hypot(math.hypot(shift, LED_MM), shift),
+        Block.CENTRES: centres[:, None],
+        Block.RADII: errors.whole_radius.sigma,
+    }
+    return prior_of(machine, np.zeros(1, dtype=np.int64), known)
 
 
-def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[str, Floats]:
+def _growth(errors: Errors) -> float:
+    return math.hypot(errors.scale_isotropic.mean, errors.scale_isotropic.sigma)
+
+
+def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[Block, Any]:
     """Standard deviations of pose and lens.
 
     A camera whose principal point is off is turned until its picture is in place again.
@@ -112,9 +104,9 @@ def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[str, Flo
     known = 0.0 if lens_known else 1.0
     return {
         Block.CAMERA_TURN: np.array([aimed, aimed, tilt]),
-        Block.PINHOLE: np.full(3, errors.camera_shift.sigma),
+        Block.PINHOLE: errors.camera_shift.sigma,
         Block.FOCAL: known * np.array([errors.camera_focal.sigma, OBLONG]),
-        Block.PRINCIPAL: np.full(2, principal),
+        Block.PRINCIPAL: principal,
         Block.DISTORTION: known * np.array(DISTORTIONS),
     }
 

@@ -52,10 +52,6 @@ from tbcad.tolerancing.process.process import Process, load_process, process_err
 
 DEFAULT_PROCESS = "fdm"  # a prototype is printed; its design does not say how
 SIMULATED = "simulated"  # source of a run that tbcad simulate-run wrote
-READING = "run and export"
-DETECTING = "highlights in photographs"
-ESTIMATING = "machine and its uncertainty"
-WRITING = "files"
 COVARIANCE = "covariance.npz"
 
 
@@ -89,10 +85,10 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
     """
     folder, exports, out = Path(options.run), Path(options.exports), Path(options.out)
     progress, detail = options.progress, options.detail
-    progress(READING)
+    progress("run and export")
     process = load_process(options.process or DEFAULT_PROCESS, options.settings)
     run = read_run(folder)
-    check_same_export(run, exports)
+    check_same_export(folder, run.record, exports)
     machines = {name: run.of_frames(frames) for name, frames in run.record.machines.items()}
     inputs = (folder, exports, options.intrinsics, *files_named(options.process))
     for name in machines:
@@ -107,13 +103,13 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
     truths = [_truth(one, setup) for one, setup in zip(machines.values(), setups, strict=True)]
     found = []
     for one, setup in zip(machines.values(), setups, strict=True):
-        progress(DETECTING)
+        progress("highlights in photographs")
         measured = parse_measured(tuple(options.measured), len(setup.plan))
         prior = setup.prior(process_errors(process), measured)
         detection = detect(one, prior, object_room(export), dome_radius(export), detail)
-        progress(ESTIMATING)
+        progress("machine and its uncertainty")
         found.append(calibrate(setup, detection, prior, detail))
-    progress(WRITING)
+    progress("files")
     written = []
     for (name, one), result, truth in zip(machines.items(), found, truths, strict=True):
         judged, basis = verdict(result), _basis(one, result.setup, options, process)
@@ -213,10 +209,9 @@ def _recovered_text(
     figures = sum(len(kind.sigma) for kind in kinds)
     within = sum(kind.within * len(kind.sigma) for kind in kinds) / figures
     known = result.rays.known
-    errors = ray_errors(result.found, truth, known.frame, known.sphere)
     found = [
         f"{np.median(place_mm(one)):.3f} mm, {np.median(turn_mrad(one)):.2f} mrad"
-        for one in (errors.relative, errors.in_run)
+        for one in ray_errors(result.found, truth, known.frame, known.sphere)
     ]
     lines = [
         f"of {figures} errors that were simulated, {within:.0%} are recovered to two standard "

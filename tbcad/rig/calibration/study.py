@@ -7,16 +7,15 @@ of the whole machine, nothing known but by the process.
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
 
-from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
+from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.geometry.vectors import unit
 from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.stage.leds import hidden_by_object
 from tbcad.rig.calibration.calibrate import Setup, prepared_setup, ray_places
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Block, Covariance, Prior, covariance
+from tbcad.rig.calibration.estimate.parameters import Block, Prior, prior_of
 from tbcad.rig.calibration.led_layout import (
     FREE,
     PRIOR_MM,
@@ -40,7 +39,6 @@ LARGE_MM = 10.0  # prior standard deviation that tells nothing
 ONE_BALL = "free, 50 stops"
 STOPS_OF_ONE = 50  # photographs of one ball on its base
 SHARES = (50, 95)  # percent of the mirrors
-WHERE = "an earlier estimate, other LEDs"
 NOTES = (
     "Bounds of Cramer and Rao: no estimate without bias is better. mrad: root mean square angle "
     "between a ray and the true one; mm: root mean square distance at the object's centre; both "
@@ -65,7 +63,10 @@ def calibration_study(export: ExportedDesign, progress: Progress) -> Study:
     progress("whole machines")
     whole = _whole_table(setup, placed, progress)
     places = _places_table(placed)
-    figures = _figures(alone, whole)
+    usual = next(row for row in whole.records() if row["noise_px"] == USUAL_PX)
+    figures = tuple(
+        Figure("rays after a run, fdm", unit, usual[f"{unit}_50"]) for unit in ("mm", "mrad")
+    )
     return Study(
         "calibration", figures, (alone, whole, places), panels(whole, USUAL_PROCESS), NOTES
     )
@@ -104,13 +105,8 @@ def _case(layout: Layout, prior: str) -> Record:
 def _one_ball(setup: Setup, layout: Layout) -> Record:
     """Balls of the prototype, each by 50 stops of the base at known angles, nothing else free."""
     machine = replace(setup.designed, leds=layout.leds)
-    centres, radii = (np.full(one.shape, LARGE_MM) for one in (machine.centre, machine.radius))
-    prior = setup.prior(process_errors(load_process(USUAL_PROCESS)))
-    fixed = {block: np.zeros_like(sigma) for block, sigma in prior.sigma.items()}
-    leds = {Block.LEDS: np.zeros(machine.leds.shape)}
-    alone = replace(
-        prior, mean=machine, sigma=fixed | leds | {Block.CENTRES: centres, Block.RADII: radii}
-    )
+    series = np.zeros(len(machine.angle), dtype=np.int64)
+    alone = prior_of(machine, series, {Block.CENTRES: LARGE_MM, Block.RADII: LARGE_MM})
     stops = np.linspace(0, len(setup.plan.angle) - 1, STOPS_OF_ONE).round().astype(np.int64)
     frame, sphere, led = _seen(setup, machine, stops)
     known = _bound(alone, USUAL_PX, (frame, sphere, led))
@@ -154,11 +150,11 @@ def whole_errors(setup: Setup, leds: Floats, process: str, noise_px: float) -> R
     return known_rays(prior, np.zeros(len(prior.free)), known, frame, sphere)
 
 
-def _bound(prior: Prior, noise_px: float, seen: tuple[Ints, Ints, Ints]) -> Covariance:
-    """The covariance that highlights of one noise allow, at the prior's mean."""
+def _bound(prior: Prior, noise_px: float, seen: tuple[Ints, Ints, Ints]) -> Floats:
+    """The covariance (q, q) that highlights of one noise allow, at the prior's mean."""
     _, slopes = highlights_with_slopes(prior, np.zeros(len(prior.free)), *seen)
-    identity = diags_array(np.ones(slopes.shape[1]))
-    return covariance(prior, csc_array(slopes.T @ slopes / noise_px**2 + identity))
+    information = (slopes.T @ slopes).toarray() / noise_px**2
+    return np.linalg.inv(information + np.eye(len(information)))
 
 
 def _seen(setup: Setup, machine: Machine, frames: Ints) -> tuple[Ints, Ints, Ints]:
@@ -191,29 +187,6 @@ def _shares(mm: Floats, mrad: Floats) -> Record:
         for share in SHARES:
             figures[f"{name}_{share}"] = float(np.percentile(values, share))
     return figures
-
-
-def _figures(alone: Table, whole: Table) -> tuple[Figure, ...]:
-    """The bounds that were estimated before the program could compute them."""
-    rows = {(r["layout"], r["leds"], r["centre and radius"]): r for r in alone.records()}
-    before: tuple[tuple[str, Cell, tuple[str, int, str]], ...] = (
-        ("centre and radius free, four LEDs", 6.5, ("design", 4, "free")),
-        ("radius known, four LEDs", 2.5, ("design", 4, "radius known")),
-        ("prior of 25 um, four LEDs", 0.68, ("design", 4, "prior 25 um")),
-        ("prior of 25 um, 16 LEDs", 0.40, ("best", 16, "prior 25 um")),
-        ("one ball over 50 stops", 0.35, ("design", 4, ONE_BALL)),
-    )
-    figures = [
-        Figure(f"rays, {what}", "mrad", rows[key]["mrad_50"], value, WHERE)
-        for what, value, key in before
-        if key in rows
-    ]
-    usual = next(r for r in whole.records() if r["noise_px"] == USUAL_PX)
-    return (
-        *figures,
-        Figure("rays after a run, fdm", "mm", usual["mm_50"]),
-        Figure("rays after a run, fdm", "mrad", usual["mrad_50"]),
-    )
 
 
 def panels(whole: Table, process: str) -> tuple[PlotPanel, ...]:

@@ -18,15 +18,14 @@ from scipy.sparse import csr_array
 from tbcad.core.geometry.vectors import perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.light.simulate.prototype.run import HALF_TURN
-from tbcad.rig.calibration.estimate.jacobian import Slopes, light_images, reflections
-from tbcad.rig.calibration.estimate.parameters import Covariance, Prior
-from tbcad.rig.calibration.estimate.solve import Estimate
+from tbcad.rig.calibration.estimate.jacobian import light_images, reflections
+from tbcad.rig.calibration.estimate.parameters import Prior, covariances
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Floats, Ints
 
 SPHERE_MM = 30.0
 """Radius within which rays are to be known: there a rotation counts as much as a shift."""
-FIGURES = 4  # of a ray: two of its place, two of its direction
+FIGURES, PLACES = 4, 2  # of a ray: two of its place, two of its direction
 APART_MM = 10.0  # of both planes: lines are straight, so any distance gives the same
 
 
@@ -64,18 +63,13 @@ class RayUncertainty:
     pixel_mm: Floats  # width of a pixel of the photograph at the object's centre, mm, (m,)
 
 
-def ray_uncertainty(found: Estimate, frame: Ints, sphere: Ints) -> RayUncertainty:
-    """Covariance of an estimate's rays by spheres (m,) in frames (m,)."""
-    return known_rays(found.prior, found.values, found.covariance, frame, sphere)
-
-
 def known_rays(
-    prior: Prior, values: Floats, known: Covariance, frame: Ints, sphere: Ints
+    prior: Prior, values: Floats, known: Floats, frame: Ints, sphere: Ints
 ) -> RayUncertainty:
-    """Covariance of rays (m,) of a machine whose free parameters (q,) have a covariance."""
+    """Covariance of rays (m,) of a machine whose free parameters have a covariance, (q, q)."""
     slopes, direction = ray_slopes(prior, values, frame, sphere)
     of_all, of_each = shared_motions(prior, frame, direction)
-    every = known.of(slopes, FIGURES)
+    every = covariances(known, slopes, FIGURES)
     return RayUncertainty(
         frame=frame,
         sphere=sphere,
@@ -88,7 +82,7 @@ def known_rays(
 
 
 def besides_motions(
-    known: Covariance, slopes: csr_array, motions: Floats, covariance: Floats
+    known: Floats, slopes: csr_array, motions: Floats, covariance: Floats
 ) -> Floats:
     """Covariance (m, 4, 4) of rays less the motion that fits all of them best.
 
@@ -97,7 +91,7 @@ def besides_motions(
     the covariance by S - M F, without a matrix as large as that.
     """
     fitted = motion_fit(motions) @ slopes
-    spread = known.times(fitted.T)
+    spread = known @ fitted.T
     by_ray = motions.reshape(len(covariance), FIGURES, -1)
     across = by_ray.swapaxes(1, 2)
     shared = (slopes @ spread).reshape(by_ray.shape) @ across
@@ -159,13 +153,22 @@ def ray_slopes(prior: Prior, values: Floats, frame: Ints, sphere: Ints) -> tuple
     machine = prior.machine(values)
     direction = ray_directions(machine, frame, sphere)
     across = perpendicular_axes(direction)
-    near, far = (
-        _moved(prior, values, machine, (frame, sphere), distance * direction, across)
+    images = [
+        light_images(prior, values, machine, frame, sphere, distance * direction)
         for distance in (0.0, APART_MM)
+    ]
+    near, far = (
+        {
+            block: -np.linalg.solve(one.by_light @ across.swapaxes(1, 2), value)
+            for block, value in one.slopes.by.items()
+        }
+        for one in images
     )
-    turns = [(b - a) / APART_MM for a, b in zip(near.values, far.values, strict=True)]
-    both = [np.concatenate(pair, axis=1) for pair in zip(near.values, turns, strict=True)]
-    return Slopes(near.columns, tuple(both)).matrix(prior), direction
+    rows = {
+        block: np.concatenate([place, (far[block] - place) / APART_MM], axis=1)
+        for block, place in near.items()
+    }
+    return replace(images[0].slopes, by=rows).matrix(prior), direction
 
 
 def ray_directions(machine: Machine, frame: Ints, sphere: Ints) -> Floats:
@@ -174,21 +177,6 @@ def ray_directions(machine: Machine, frame: Ints, sphere: Ints) -> Floats:
     pinhole = machine.camera.pinhole
     point = reflections(centre, radius, np.zeros_like(centre), pinhole).point
     return reflected_rays(pinhole, point, unit(point - centre))
-
-
-def _moved(
-    prior: Prior,
-    values: Floats,
-    machine: Machine,
-    ray: tuple[Ints, Ints],
-    light: Floats,
-    across: Floats,
-) -> Slopes:
-    """How the rays move in the planes through lights (m, 3) on them, along across (m, 2, 3)."""
-    image = light_images(prior, values, machine, *ray, light)
-    by_place = image.by_light @ across.swapaxes(1, 2)
-    moved = [np.asarray(-np.linalg.solve(by_place, value)) for value in image.slopes.values]
-    return replace(image.slopes, values=tuple(moved))
 
 
 def _root(covariance_of_two: Floats) -> Floats:

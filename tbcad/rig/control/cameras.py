@@ -64,7 +64,10 @@ class CommandCamera(RunCamera):
         """Run the command; whatever file it wrote at the output is the photograph."""
         with tempfile.TemporaryDirectory(prefix="tbcad-") as folder:
             fields = self._exposure | {PLACE: str(Path(folder, "photograph"))}
-            self._run([_filled(word, fields) for word in self._words])
+            words = self._words
+            for name, text in fields.items():
+                words = [word.replace(name, text) for word in words]
+            self._run(words)
             files = sorted(file for file in Path(folder).iterdir() if not file.name.startswith("."))
             if len(files) != 1:
                 count = f"{len(files)} files" if files else "no file"
@@ -91,12 +94,6 @@ class CommandCamera(RunCamera):
             raise CameraFault(
                 f"the camera's command ended with {done.returncode}: {last[:LONGEST_LINE]}"
             )
-
-
-def _filled(word: str, fields: dict[str, str]) -> str:
-    for field, text in fields.items():
-        word = word.replace(field, text)
-    return word
 
 
 class WatchedFolder(RunCamera):

@@ -12,13 +12,14 @@ stepper.c of GRBL 1.1h; machine_limits.c, motion_control.c, stepper.c and report
 """
 
 from collections import deque
+from collections.abc import Iterator
 from time import monotonic
 
 from tbcad.rig.control.messages import (
     RESTING,
     STATES,
     Message,
-    Port,
+    SerialPort,
     Status,
     firmware_of,
     parse,
@@ -43,7 +44,7 @@ GONE = "the controller does not answer: is it plugged in and switched on?"
 class Grbl:
     """A controller on a port."""
 
-    def __init__(self, port: Port, note: Progress) -> None:
+    def __init__(self, port: SerialPort, note: Progress) -> None:
         """Speak to a controller; notes are what the operator should know."""
         self._port, self._note = port, note
         self._unread, self._messages = b"", deque[Message]()
@@ -61,14 +62,11 @@ class Grbl:
         a program that was killed: a soft reset at rest clears it and keeps the motor on. One that
         is silent homes, or was stopped by an alarm, which a soft reset ends as well.
         """
-        begun = monotonic()
-        while monotonic() - begun < BANNER_S and not self.greeting:
-            message = self._next()
-            if message and message.kind == "banner":
+        for message in self._heard_within(BANNER_S, ask=True):
+            if message.kind == "banner":
                 self.greeting = message.text
-            elif message and message.kind == "status":
+            if message.kind in ("banner", "status"):
                 break
-            self._ask()
         if self.greeting:
             self.forget()  # grblHAL tells after its greeting that it must home
         else:
@@ -169,15 +167,15 @@ class Grbl:
                 self.reset()
                 return
             self._port.write(HOLD)
-            self._until_rest()
+            for message in self._heard_within(SILENCE_S, ask=True):
+                if message.status and message.status.resting:
+                    break
 
     def reset(self) -> None:
         """Reset the controller, which must rest or home, and wait for its greeting."""
         self._port.write(RESET)
-        begun = monotonic()
-        while monotonic() - begun < BANNER_S:
-            message = self._next()
-            if message and message.kind == "banner":
+        for message in self._heard_within(BANNER_S):
+            if message.kind == "banner":
                 self.greeting = message.text
                 self.pending, self._stopped = "", False
                 self.forget()
@@ -186,26 +184,22 @@ class Grbl:
 
     def forget(self) -> None:
         """Ignore whatever was sent until now, or is about to come."""
-        begun = monotonic()
-        while monotonic() - begun < LATE_S:
-            self._next()
+        for _ in self._heard_within(LATE_S):
+            pass
 
     def status_in_alarm(self) -> Status | None:
         """A status report, in alarm too; None: no answer."""
-        begun = monotonic()
-        while monotonic() - begun < SILENCE_S:
-            self._ask()
-            message = self._next()
-            if message and message.status:
-                return message.status
-        return None
+        heard = self._heard_within(SILENCE_S, ask=True)
+        return next((message.status for message in heard if message.status), None)
 
-    def _until_rest(self) -> None:
+    def _heard_within(self, seconds: float, ask: bool = False) -> Iterator[Message]:
+        """Whatever comes within a time, while the status is asked for or not."""
         begun = monotonic()
-        while monotonic() - begun < SILENCE_S:
-            status = self.status_in_alarm()
-            if status is None or status.resting:
-                return
+        while monotonic() - begun < seconds:
+            if ask:
+                self._ask()
+            if message := self._next():
+                yield message
 
     def _refuse(self, message: Message, line: str) -> None:
         """Raise what ends a run."""

@@ -12,17 +12,17 @@ tried with both.
 import json
 import os
 import re
-import socket
-import ssl
+import tomllib
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from http.client import HTTPConnection, HTTPException, HTTPResponse, HTTPSConnection
+from importlib.resources import files
 from threading import Thread
 from time import monotonic, sleep
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import SplitResult, urlsplit
 
 from tbcad.errors import InputError
 from tbcad.rig.control.plan import ControllerReset, MachineFault
@@ -33,26 +33,12 @@ KEY = "MOONRAKER_API_KEY"
 ANSWER_S = 5.0  # that a request may take which does not wait for the machine
 MOST_BYTES = 16_000_000  # of an answer; a large configuration has 200 kB
 UNAUTHORIZED = 401
-PORTS = {"http": 80, "https": 443}
 _URL = re.compile(r"https?://[\w.:\[\]-]+(?:/[\w./~-]*)?", re.ASCII | re.IGNORECASE)
 ELSEWHERE = "is this Moonraker? It listens at port 7125, as in moonraker:http://HOST:7125"
 FORM = "allowed is moonraker:http://HOST or moonraker:http://HOST:7125, with https too"
 
 AWAY = "is the printer's computer switched on and in this network?"
-REASONS: tuple[tuple[type[Exception], str], ...] = (
-    (socket.gaierror, "there is no such host: look at its name, or use its number"),
-    (UnicodeError, "there is no such host: look at its name, or use its number"),
-    (
-        ssl.SSLCertVerificationError,
-        "its certificate is not trusted: name that of its authority in SSL_CERT_FILE",
-    ),
-    (ssl.SSLError, "it does not speak https: say http://"),
-    (ConnectionRefusedError, f"nothing listens there: {ELSEWHERE}"),
-    (TimeoutError, f"no answer: {AWAY}"),
-    (ConnectionResetError, f"the connection was cut: {AWAY}"),
-    (HTTPException, f"the answer is not HTTP: {ELSEWHERE}, or at https://"),
-)
-"""Why there is no answer, and what to do; the first that fits."""
+WORDS = tomllib.loads(files(__package__).joinpath("klipper_words.toml").read_text("utf-8"))
 
 
 class Unreachable(MachineFault):
@@ -68,34 +54,24 @@ class Refused(MachineFault):
         self.code = code
 
 
-@dataclass(frozen=True)
-class Address:
-    """Where Moonraker listens."""
-
-    host: str
-    port: int
-    path: str  # before those of the API, without a slash at its end
-    secure: bool  # whether by https
-
-
-def read_address(text: str) -> Address:
+def read_address(text: str) -> SplitResult:
     """Read the URL of a server."""
     if any(sign in text for sign in "@?#"):
         raise InputError(f"--port has more than a host: {FORM}; an API key goes into {KEY}")
     try:
         parts = urlsplit(text)
-        port = parts.port or (PORTS[parts.scheme] if parts.port is None else 0)
-    except (ValueError, KeyError):
-        port = 0
-    if not port or not parts.hostname or _URL.fullmatch(text) is None:
+        valid = parts.hostname and parts.port != 0 and _URL.fullmatch(text)
+    except ValueError:
+        valid = None
+    if not valid:
         raise InputError(f"--port names {text!r:.60}: {FORM}")
-    return Address(parts.hostname, port, parts.path.rstrip("/"), parts.scheme == "https")
+    return parts
 
 
 class Moonraker:
     """A server; each request has a connection of its own, from any thread."""
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: SplitResult) -> None:
         """Ask a server, with the API key of the environment if there is one."""
         self._address = address
         key = os.environ.get(KEY, "").strip()
@@ -115,7 +91,10 @@ class Moonraker:
         try:
             response, data = self._answer(method, path, body, limit_s)
         except (OSError, HTTPException, ValueError) as error:
-            raise Unreachable(f"Moonraker: {_reason(error)}") from None
+            kinds = (kind.__name__ for kind in type(error).__mro__)
+            text = next(WORDS["no_answer"][kind] for kind in kinds if kind in WORDS["no_answer"])
+            told = str(text).format(error=error, elsewhere=ELSEWHERE, away=AWAY)
+            raise Unreachable(f"Moonraker: {told}") from None
         try:
             answer = json.loads(data)
         except (ValueError, RecursionError):
@@ -134,13 +113,12 @@ class Moonraker:
         self, method: str, path: str, body: str | None, limit_s: float | None
     ) -> tuple[HTTPResponse, bytes]:
         to = self._address
-        connection = (HTTPSConnection if to.secure else HTTPConnection)(
-            to.host, to.port, timeout=ANSWER_S
-        )
+        kind = HTTPSConnection if to.scheme == "https" else HTTPConnection
+        connection = kind(to.netloc, timeout=ANSWER_S)
         try:
             connection.connect()
             connection.sock.settimeout(limit_s)
-            connection.request(method, to.path + path, body, self._headers)
+            connection.request(method, to.path.rstrip("/") + path, body, self._headers)
             response = connection.getresponse()
             return response, response.read(MOST_BYTES)
         finally:
@@ -156,13 +134,6 @@ def _error_text(response: HTTPResponse, answer: Any) -> str:
     return f"the server answers {response.status} {response.reason}: {ELSEWHERE}"
 
 
-def _reason(error: Exception) -> str:
-    for kind, text in REASONS:
-        if isinstance(error, kind):
-            return text
-    return f"{error}: {AWAY}"
-
-
 MOTOR = "manual_stepper base"
 INFO, SCRIPT = "/printer/info", "/printer/gcode/script"
 QUERY, ENDSTOPS = "/printer/objects/query", "/printer/query_endstops/status"
@@ -176,21 +147,6 @@ LOOK_S = 0.2  # between looks at the state while a script runs
 LATE_S = 5.0  # longer than expected: another program's G-code comes first
 TRIES = 2
 HOLD_FIRST = "hold the base by hand and put the zero pin in first"
-SAFE = {
-    STARTUP: f"the base is not held: {HOLD_FIRST}, then wait until it is ready",
-    "error": (
-        f"the base may not be held: {HOLD_FIRST}, then mend what it says and say FIRMWARE_RESTART"
-    ),
-    "shutdown": (
-        "the motor is off, or goes off with FIRMWARE_RESTART, and the base falls: "
-        f"{HOLD_FIRST}, then say FIRMWARE_RESTART"
-    ),
-    DISCONNECTED: (
-        "lights may be on; the motor is off, or goes off when Klipper starts, and the base falls: "
-        f"{HOLD_FIRST}, then start the service klipper"
-    ),
-}
-"""What is safe to do in each state that is not ready."""
 LET_GO = "Klipper has let the motor go (M84, a restart, or idle_timeout): the angle is lost"
 
 
@@ -214,7 +170,8 @@ class KlipperState:
     @property
     def safe(self) -> str:
         """What is safe to do."""
-        return SAFE.get(self.name, f"the base may not be held: {HOLD_FIRST}")
+        words = WORDS["safe"]
+        return str(words.get(self.name, words["other"])).format(hold=HOLD_FIRST)
 
 
 class Klipper:

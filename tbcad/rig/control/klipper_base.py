@@ -11,11 +11,11 @@ from configparser import Error, RawConfigParser
 from dataclasses import dataclass
 from math import ceil, isclose
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.errors import InputError
-from tbcad.rig.control.base import travel_s
+from tbcad.rig.control.base import Base, travel_s
 from tbcad.rig.control.klipper import HOLD_FIRST, MOTOR, READY, Klipper
 from tbcad.rig.control.plan import ControllerReset, ControlPlan, MachineFault, Move
 from tbcad.types import Progress
@@ -266,6 +266,10 @@ class KlipperBase:
         except MachineFault as fault:
             return f"lights may be on: {fault}: before any supply is cut, {HOLD_FIRST}"
         return ""
+
+
+DrivenMachine: TypeAlias = Base | KlipperBase
+"""Motions and lights of one machine; all but `secure` raise MachineFault when it fails."""
 
 
 def _pin(output: int, *, on: bool) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.resources import files
-from typing import TYPE_CHECKING, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 from tbcad.errors import InputError
 from tbcad.rig.control.plan import MachineFault
@@ -30,31 +30,13 @@ _FIRMWARES = {"grblhal": re.compile(r"grblhal", re.I), "grbl": re.compile(r"Grbl
 _CODE = re.compile(r"(error|ALARM):(\d+)")
 _SETTING = re.compile(r"\$(\d+)=(-?\d+(?:\.\d+)?)")
 _PLACES = ("MPos", "WPos", "WCO")
-STATES = {
-    "Idle": "look at its cable",
-    "Alarm": "it is locked, and takes $X or $H only",
-    "Check": "it moves nothing in check mode: reset it",
-    "Sleep": "its motor is off, and the base may have fallen: zero pin in, then start again",
-}
-"""What a controller that rests, and answers a line by nothing, wants."""
+CODES = tomllib.loads(files(__package__).joinpath("grbl_codes.toml").read_text("utf-8"))
+STATES: dict[str, str] = CODES["resting"]
 UNKNOWN = "its meaning is in the manual of the controller's firmware"
 
 
-class Port(Protocol):
-    """What a controller is spoken to through."""
-
-    def write(self, data: bytes) -> None:
-        """Send bytes."""
-
-    def read(self, wait: bool) -> bytes:
-        """Return the bytes that have come; wait for the first for a moment at most."""
-
-    def close(self) -> None:
-        """Give the port up."""
-
-
 class SerialPort:
-    """A port of pyserial's; its errors are those of a machine."""
+    """What a controller is spoken to through: pyserial's port, whose errors are a machine's."""
 
     def __init__(self, name: str) -> None:
         """Open a port."""
@@ -192,5 +174,4 @@ def _numbers(text: str) -> tuple[float, ...]:
 
 def told(line: str, message: Message) -> str:
     """An error or alarm that answers a line, with its meaning."""
-    codes = tomllib.loads(files(__package__).joinpath("grbl_codes.toml").read_text("utf-8"))
-    return f"{line!r}: {message.text}: {codes[message.kind].get(str(message.code), UNKNOWN)}"
+    return f"{line!r}: {message.text}: {CODES[message.kind].get(str(message.code), UNKNOWN)}"

@@ -3,7 +3,6 @@
 Source: Exif 2.32, tables 4 and 7.
 """
 
-import hashlib
 import io
 import math
 import re
@@ -11,7 +10,6 @@ import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from time import monotonic
 from typing import Any, Protocol
@@ -22,8 +20,9 @@ from tbcad.cad.formats.pictures import PICTURE_SUFFIXES, RAW_SUFFIXES
 from tbcad.cad.formats.pixels import TIFF_SIGNATURES
 from tbcad.errors import InputError
 from tbcad.records.prototype_drive import Phase
-from tbcad.records.run import Exposure, Frame, PhaseExposure, RunRecord, Setting, exposure_name
-from tbcad.rig.control.plan import CameraFault, ControlPlan, DrivenMachine
+from tbcad.records.run import PhaseExposure, RunRecord, Setting
+from tbcad.rig.control.klipper_base import DrivenMachine
+from tbcad.rig.control.plan import CameraFault, ControlPlan
 from tbcad.rig.control.selection import RunSelection
 from tbcad.rig.runs import decoded_image
 
@@ -255,21 +254,6 @@ def check_like_record(record: RunRecord, phase: str, photograph: Photograph) -> 
             raise CameraFault(
                 f"{name} is {settings.get(name, 'not told')}, and the run is locked to {value}"
             )
-
-
-def exposure_of(photograph: Photograph, frame: Frame, phase: str) -> Exposure:
-    """The sidecar of a photograph."""
-    return Exposure(
-        frame=frame,
-        phase=phase,
-        file=exposure_name(frame, phase) + photograph.shot.suffix,
-        sha256=hashlib.sha256(photograph.shot.data).hexdigest(),
-        width_px=photograph.size_px[0],
-        height_px=photograph.size_px[1],
-        exposure_s=photograph.told_s or photograph.asked_s,
-        taken=datetime.now(UTC),
-        settings=photograph.settings,
-    )
 
 
 def run_record(

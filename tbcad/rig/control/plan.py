@@ -4,11 +4,10 @@ Pauses of rotation_plan.nc become questions to the operator, and what it does fo
 done by the run: a light, the camera, the light off again.
 """
 
-import hashlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.core.spec.prototype import MotionSpec
@@ -20,7 +19,7 @@ from tbcad.records.prototype import Prototype
 from tbcad.records.prototype_drive import Phase
 from tbcad.records.run import Frame
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow, StopRow
-from tbcad.types import Progress
+from tbcad.rig.runs import export_digests
 
 PROGRAM = "rotation_plan.nc"
 _MOVE = re.compile(r"G1 ([XA])(-?\d+\.\d+)(?: F\d+(?:\.\d+)?)?$")
@@ -153,7 +152,7 @@ def read_control_plan(folder: Path) -> ControlPlan:
     program = read_program(folder)
     angles = _angles(folder, program)
     return ControlPlan(
-        sha256={name: _sha256(folder / name) for name in FILES},
+        sha256=export_digests(folder, FILES),
         size_px=(design.cameras[0].width_px, design.cameras[0].height_px),
         firmware=controller.firmware,
         axis=controller.axis,
@@ -200,16 +199,6 @@ def _angles(folder: Path, program: Program) -> dict[int, float]:
     return angles
 
 
-def _sha256(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except FileNotFoundError:
-        raise InputError(f"{path} is not there: {Prototype.MISSING}") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}: {REBUILD}") from None
-
-
 class _Fault(Exception):
     def __init__(self, text: str) -> None:
         """Keep the text as one line: parts of it come from a controller or a camera."""
@@ -226,33 +215,3 @@ class ControllerReset(MachineFault):
 
 class CameraFault(_Fault):
     """A photograph that was not taken, or cannot be used: the run goes on with the next."""
-
-
-class DrivenMachine(Protocol):
-    """Motions and lights of one machine; all but `secure` raise MachineFault when it fails."""
-
-    switch_s: float  # that it needs for the lights of a photograph
-
-    def connect(self) -> None:
-        """Wait until the controller answers."""
-
-    def check_settings(self, note: Progress, *, send: bool) -> None:
-        """Refuse settings that are not the build's by an InputError, or send and tell them."""
-
-    def home(self) -> None:
-        """Bring the base to a known angle, all lights off."""
-
-    def drive(self, move: Move, settle_s: float = 0.0) -> None:
-        """Drive to a place and rest there."""
-
-    def light(self, output: int, *, on: bool) -> None:
-        """Switch a light; the base is at rest then."""
-
-    def wait(self, seconds: float) -> None:
-        """Let lights that were switched settle."""
-
-    def release(self) -> None:
-        """Close the camera's relay for as long as it needs."""
-
-    def secure(self) -> str:
-        """Hold the base and switch all lights off; return what could not be done, if anything."""

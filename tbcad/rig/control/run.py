@@ -4,15 +4,14 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
-from time import monotonic
 
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
-from tbcad.options.machines import Ask, RunOptions, Show
+from tbcad.options.machines import RunOptions
 from tbcad.options.shared import exposures
 from tbcad.output.manifest import refuse_inside
 from tbcad.output.single_files import refuse_inputs
-from tbcad.records.run import DARK_LIT, PhaseTimes, RunRecord, read_record
+from tbcad.records.run import DARK_LIT, PhaseTimes, read_record
 from tbcad.rig.control.base import Base
 from tbcad.rig.control.cameras import (
     check_camera_name,
@@ -21,9 +20,9 @@ from tbcad.rig.control.cameras import (
 )
 from tbcad.rig.control.grbl import Grbl
 from tbcad.rig.control.klipper import PREFIX, Klipper, Moonraker, read_address
-from tbcad.rig.control.klipper_base import KlipperBase, read_klipper_files
+from tbcad.rig.control.klipper_base import DrivenMachine, KlipperBase, read_klipper_files
 from tbcad.rig.control.messages import SerialPort
-from tbcad.rig.control.plan import ControlPlan, DrivenMachine, MachineFault, read_control_plan
+from tbcad.rig.control.plan import ControlPlan, MachineFault, read_control_plan
 from tbcad.rig.control.selection import (
     BYTES_PER_PX,
     CAPTURE_S,
@@ -37,10 +36,8 @@ from tbcad.rig.control.selection import (
     expected_seconds,
 )
 from tbcad.rig.control.session import Session
-from tbcad.rig.runs import DiskFault, check_new, read_run
+from tbcad.rig.runs import DiskFault, check_new, check_same_export, read_run
 from tbcad.types import Progress
-
-STOPPED = "stopped by the operator"
 
 
 def dry_run(options: RunOptions) -> DryRun:
@@ -78,24 +75,12 @@ def run_machine(options: RunOptions) -> Outcome:
         with _secured(base, note):
             camera = connected_camera(options.camera, options.timeout_s)
             stack.callback(camera.close)
-            session = Session(plan, chosen, base, camera)
+            session = Session(plan, chosen, (base, camera), (ask, note))
             with _faults_as_input_errors(port):
-                look = options.preflight
-                session.begin(out, ask, note, resume=options.resume, look=look)
-            if look == "only":
+                session.begin(out, resume=options.resume, look=options.preflight)
+            if options.preflight == "only":
                 return Outcome(out, 0, 0, 0, {}, "", base.secure(), 0.0)
-            return _photographed(session, ask, options.show or partial(stages, silent=True))
-
-
-def _photographed(session: Session, ask: Ask, show: Show) -> Outcome:
-    begun, before, stopped = monotonic(), session.taken, ""
-    try:
-        session.photograph(ask, show)
-    except (MachineFault, DiskFault) as fault:
-        stopped = str(fault)
-    except KeyboardInterrupt:
-        stopped = STOPPED
-    return session.finish(stopped, monotonic() - begun, before)
+            return session.photograph(options.show or partial(stages, silent=True))
 
 
 @contextmanager
@@ -134,7 +119,9 @@ def _prepared(options: RunOptions) -> tuple[ControlPlan, RunSelection]:
         check_new(out)
         return plan, RunSelection(frames, phases, size, times)
     record = read_record(out)
-    _check_same_export(options, plan, record)
+    if record.source != "camera":
+        raise InputError(f"{out} is a simulated run: name another folder")
+    check_same_export(out, record, exports)
     known = ",".join(name for name in record.phases if name != DARK_LIT)
     recorded = chosen_phases(plan, known, record.times)
     phases = chosen_phases(plan, options.phases, record.times)
@@ -153,19 +140,6 @@ def _prepared(options: RunOptions) -> tuple[ControlPlan, RunSelection]:
             raise InputError(f"{out} was begun with another {name}: leave it out with --resume")
     size = record.width_px, record.height_px
     return plan, RunSelection(record.frames, recorded, size, record.times)
-
-
-def _check_same_export(options: RunOptions, plan: ControlPlan, record: RunRecord) -> None:
-    if record.source != "camera":
-        raise InputError(f"{options.out} is a simulated run: name another folder")
-    other = [
-        name for name, digest in plan.sha256.items() if record.export_sha256.get(name) != digest
-    ]
-    if other:
-        raise InputError(
-            f"{options.out} is a run of another export: {other[0]} of {options.exports} differs; "
-            "name the export that it was begun with"
-        )
 
 
 def machine_at(

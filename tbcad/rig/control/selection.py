@@ -200,11 +200,6 @@ class DryRun:
     seconds: float
     disk_bytes: int
 
-    @property
-    def photographs(self) -> int:
-        """Number of photographs."""
-        return count(self.remaining)
-
 
 def outcome_lines(outcome: Outcome, resume: str) -> Iterator[str]:
     """A dozen lines at most, with the command that goes on with the run."""
@@ -237,7 +232,7 @@ def dry_run_record(found: DryRun) -> dict[str, object]:
     positions = [{"title": shots.title, "phases": list(shots.phases)} for shots in found.remaining]
     return {
         "schema": "tbcad-run-plan/1",
-        "photographs": found.photographs,
+        "photographs": count(found.remaining),
         "seconds": found.seconds,
         "disk_bytes": found.disk_bytes,
         "positions": positions,
@@ -248,7 +243,7 @@ def dry_run_lines(found: DryRun) -> Iterator[str]:
     """What a run would do."""
     first = found.remaining[0] if found.remaining else None
     positions = len(found.remaining)
-    yield f"{found.photographs} photographs at {positions} positions would be taken"
+    yield f"{count(found.remaining)} photographs at {positions} positions would be taken"
     if first is None:
         return
     yield f"phases at the first: {', '.join(first.phases)}"

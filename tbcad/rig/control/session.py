@@ -1,25 +1,27 @@
 """A run from its start, or from where it stopped, to its end."""
 
 from contextlib import AbstractContextManager, suppress
+from datetime import UTC, datetime
 from functools import partial
 from itertools import groupby
 from pathlib import Path
+from time import monotonic
 
 from tbcad.errors import InputError
 from tbcad.options.machines import Ask, Preflight, Show
 from tbcad.records.run import Frame, exposure_name
+from tbcad.rig.control.klipper_base import DrivenMachine
 from tbcad.rig.control.photographs import (
     Photograph,
     RunCamera,
     Shot,
     check_like_record,
-    exposure_of,
     faults_refused,
     light_on,
     run_record,
     taken_twice,
 )
-from tbcad.rig.control.plan import CameraFault, ControlPlan, DrivenMachine, MachineFault
+from tbcad.rig.control.plan import CameraFault, ControlPlan, MachineFault
 from tbcad.rig.control.selection import (
     Outcome,
     RunSelection,
@@ -32,9 +34,10 @@ from tbcad.rig.control.selection import (
     expected_seconds,
     size_text,
 )
-from tbcad.rig.runs import DiskFault, RunWriter, new_run, resumed_run
+from tbcad.rig.runs import DiskFault, RunWriter, exposure_of, new_run, resumed_run
 from tbcad.types import Progress
 
+STOPPED = "stopped by the operator"
 MOST_MISSED = 12  # photographs one after the other: the camera is gone, not one photograph
 STRAIGHT, TURNED = "object straight", "object turned by 180 degrees about z"
 
@@ -43,27 +46,23 @@ class Session:
     """One machine and one run."""
 
     def __init__(
-        self, plan: ControlPlan, options: RunSelection, base: DrivenMachine, camera: RunCamera
+        self,
+        plan: ControlPlan,
+        options: RunSelection,
+        machine: tuple[DrivenMachine, RunCamera],
+        operator: tuple[Ask, Progress],
     ) -> None:
-        """Run with a machine and a camera that are connected."""
+        """Run with a machine and camera that are connected, and an operator to ask and to tell."""
         self._plan, self._options = plan, options
-        self._base, self._camera = base, camera
+        self._base, self._camera = machine
+        self._ask, self._note = operator
         self._missed: dict[str, str] = {}
         self._homed = False
         self._expected: dict[str, float] = {}
-        self._note: Progress = lambda _: None
         self._in_row = 0
         self._writer: RunWriter
 
-    def begin(
-        self,
-        folder: Path,
-        ask: Ask,
-        note: Progress,
-        *,
-        resume: bool,
-        look: Preflight = "off",
-    ) -> None:
+    def begin(self, folder: Path, *, resume: bool, look: Preflight = "off") -> None:
         """Take a photograph with each exposure to know the camera, and begin or resume the folder.
 
         A new run begins with a preflight, unless `look` is "off"; nothing is written if it is
@@ -72,15 +71,14 @@ class Session:
         InputError: camera, disk, folder or exposure will not do; nothing was photographed;
         MachineFault: the machine does not do what it is told.
         """
-        self._note = note
         if resume:
-            note("the photographs that are there are compared with their sha256")
+            self._note("the photographs that are there are compared with their sha256")
             self._writer = resumed_run(folder)
         remaining = self._options.left(self._writer.taken if resume else ())
         if not remaining:
             return
         if self._camera.released:
-            self._get_known_angle(_turned(remaining), ask)
+            self._get_known_angle(_turned(remaining))
         trials = self._trials()
         if resume:
             with faults_refused(str(folder), ": set the camera as it was"):
@@ -88,7 +86,7 @@ class Session:
                     check_like_record(self._writer.record, phase, trial)
         trial = max(trials.values(), key=lambda one: len(one.shot.data))
         if look != "off" and not resume:
-            self._preflight(trial, remaining, ask)
+            self._preflight(trial, remaining)
             if look == "only":
                 return
         each_s = sum(one.seconds for one in trials.values()) / len(trials)
@@ -100,7 +98,7 @@ class Session:
         if not resume:
             self._writer = new_run(folder, run_record(self._plan, self._options, trials, seconds))
         self._writer.log("resumed" if resume else "started", camera=trial.model)
-        note(
+        self._note(
             f"{count(remaining)} photographs at {len(remaining)} positions take about "
             f"{duration_text(seconds)} and {size_text(needed)} of disk"
         )
@@ -122,12 +120,12 @@ class Session:
             )
         return trial
 
-    def _preflight(self, trial: Photograph, remaining: list[Shots], ask: Ask) -> None:
+    def _preflight(self, trial: Photograph, remaining: list[Shots]) -> None:
         """Look at the middle stop of the first run under each light; nothing is kept."""
         from tbcad.rig.control.preflight import preflight  # numerical libraries, for this alone
 
         if not self._homed:
-            self._get_known_angle(_turned(remaining), ask)
+            self._get_known_angle(_turned(remaining))
         first = [one for one in remaining if _turned([one]) == _turned(remaining)]
         shots = first[len(first) // 2]
         self._base.drive(self._plan.program.start)
@@ -144,16 +142,39 @@ class Session:
         lights = {one.name: one for one in self._options.phases}
         return light_on(self._base, lights[phase], self._plan.motion.light_s)
 
-    def photograph(self, ask: Ask, show: Show) -> None:
+    def photograph(self, show: Show) -> Outcome:
+        """Photograph what remains; then hold the base, switch lights off, close the journal."""
+        begun, before, stopped = monotonic(), len(self._writer.taken), ""
+        try:
+            self._photograph(show)
+        except (MachineFault, DiskFault) as fault:
+            stopped = str(fault)
+        except KeyboardInterrupt:
+            stopped = STOPPED
+        seconds, unsafe, writer = monotonic() - begun, self._base.secure(), self._writer
+        with suppress(DiskFault):
+            writer.log("stopped" if stopped else "finished", reason=stopped)
+        return Outcome(
+            folder=writer.folder,
+            wanted=len(writer.record.frames) * len(writer.record.phases),
+            taken=len(writer.taken),
+            new=len(writer.taken) - before,
+            missed=self._missed,
+            stopped=stopped,
+            unsafe=unsafe,
+            seconds=seconds,
+        )
+
+    def _photograph(self, show: Show) -> None:
         """Home, and photograph what remains; MachineFault or DiskFault: it cannot go on."""
         left = self._options.left(self._writer.taken)
         runs = [list(run) for _, run in groupby(left, lambda one: one.frame.object_turn_deg)]
         for number, run in enumerate(runs):
             if number:
                 self._base.drive(self._plan.program.start)
-                _have_done(ask, self._plan.program.turn)
+                self._have_done(self._plan.program.turn)
             elif not self._homed:
-                self._get_known_angle(_turned(run), ask)
+                self._get_known_angle(_turned(run))
             with show({one.title: self._expected[one.title] for one in run}) as screen:
                 self._base.drive(self._plan.program.start)
                 for shots in run:
@@ -162,13 +183,18 @@ class Session:
         if self._expected:
             self._base.drive(self._plan.program.end)
 
-    def _get_known_angle(self, turned: bool, ask: Ask) -> None:
+    def _get_known_angle(self, turned: bool) -> None:
         """Have the operator prepare the machine, and home."""
         ready = self._plan.program.ready
-        _have_done(ask, ready.replace(STRAIGHT, TURNED) if turned else ready)
+        self._have_done(ready.replace(STRAIGHT, TURNED) if turned else ready)
         self._note("homing" if self._plan.program.homes else "angle zero as the pin has it")
         self._base.home()
         self._homed = True
+
+    def _have_done(self, text: str) -> None:
+        """Ask for what a pause of the program says; MachineFault: the operator will not."""
+        if not self._ask(text.removesuffix("? Then resume").removesuffix(", then resume")):
+            raise MachineFault("the operator did not go on")
 
     def _position(self, shots: Shots, note: Progress) -> None:
         self._base.drive(self._plan.program.stops[shots.frame.stop], self._plan.motion.settle_s)
@@ -193,37 +219,12 @@ class Session:
                     f"{MOST_MISSED} photographs in a row are missing: {fault}"
                 ) from None
         else:
-            self._writer.add(exposure_of(photograph, frame, phase), photograph.shot.data)
+            shot, seconds = photograph.shot, photograph.told_s or photograph.asked_s
+            image = shot.data, shot.suffix, photograph.size_px
+            now, settings = datetime.now(UTC), photograph.settings
+            self._writer.add(exposure_of(frame, phase, image, seconds, now, settings), shot.data)
             self._in_row = 0
-
-    def finish(self, stopped: str, seconds: float, before: int) -> Outcome:
-        """Hold the base, switch lights off, close the journal."""
-        unsafe = self._base.secure()
-        writer = self._writer
-        with suppress(DiskFault):
-            writer.log("stopped" if stopped else "finished", reason=stopped)
-        return Outcome(
-            folder=writer.folder,
-            wanted=len(writer.record.frames) * len(writer.record.phases),
-            taken=len(writer.taken),
-            new=len(writer.taken) - before,
-            missed=self._missed,
-            stopped=stopped,
-            unsafe=unsafe,
-            seconds=seconds,
-        )
-
-    @property
-    def taken(self) -> int:
-        """Number of photographs that are there."""
-        return len(self._writer.taken)
 
 
 def _turned(remaining: list[Shots]) -> bool:
     return bool(remaining and remaining[0].frame.object_turn_deg)
-
-
-def _have_done(ask: Ask, text: str) -> None:
-    """Ask for what a pause of the program says; MachineFault: the operator will not."""
-    if not ask(text.removesuffix("? Then resume").removesuffix(", then resume")):
-        raise MachineFault("the operator did not go on")

@@ -6,7 +6,7 @@ turned between both runs; camera, axis and LEDs are not. The shell of one camera
 one frame, whose spheres are its mirrors. machine.json has its state, calibrated or simulated.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from tbcad.core.optics.reflection import reflection_points
 from tbcad.errors import InputError
 from tbcad.records.calibration import CalibratedCamera, MachineRecord, SphereRecord
 from tbcad.records.run import Frame
-from tbcad.types import Floats, Ints
+from tbcad.types import Bools, Floats, Ints
 
 RECORD = "machine.json"
 TRUTH = "truth.json"  # the machine of a simulated run, in its folder
@@ -84,6 +84,10 @@ class Highlights:
 
     def __len__(self) -> int:
         return len(self.frame)
+
+    def only(self, which: Bools | Ints) -> "Highlights":
+        """Some of them."""
+        return Highlights(**{one.name: getattr(self, one.name)[which] for one in fields(self)})
 
 
 def truth_file(machine: str) -> str:

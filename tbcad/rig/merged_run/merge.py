@@ -14,7 +14,7 @@ from tbcad.light.simulate.capture.files import capture_record, write_cameras, wr
 from tbcad.light.simulate.capture.light_field import RAY_SIGMAS
 from tbcad.light.simulate.capture.photograph import CameraPhotographs, RowBand
 from tbcad.light.simulate.prototype.merge import merge_photographs, merge_plan
-from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, ball_reflector
+from tbcad.light.simulate.prototype.run import PrototypeRun, ball_reflector
 from tbcad.light.simulate.scene.rays import meets_sphere
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.options.machines import MergeOptions
@@ -25,7 +25,6 @@ from tbcad.rig.machine.machine import RECORD, Machine, read_machine
 from tbcad.rig.machine.shells import NOT_SERVED, plan_of, tied
 from tbcad.rig.merged_run.stop_photographs import (
     CorrectedPhotographs,
-    Corrections,
     common_exposure,
     corrections,
 )
@@ -69,7 +68,10 @@ class HalfMerge:
     def bands(self, capture_mm: float, progress: Progress) -> Iterator[RowBand]:
         """Bands of the merged picture; what they lack is known when all were given."""
         in_front = partial(_shows_object, self.run.camera.pinhole, capture_mm / 2)
-        plan = merge_plan(self.run, capture_mm / 2, in_front, self._direct_stop())
+        frames = enumerate(self.photographs.frames)
+        # The first stop with a photograph also shows what is on no mirror.
+        direct = next((stop for stop, frame in frames if frame is not None), 0)
+        plan = merge_plan(self.run, capture_mm / 2, in_front, direct)
         for band in merge_photographs(plan, self.photographs, progress):
             mirror = band.rays.mirror.ravel()
             self.pixels[:] += np.bincount(mirror, minlength=len(self.pixels) + 1)[1:]
@@ -82,11 +84,6 @@ class HalfMerge:
             reason = self.photographs.missing.get(int(self.run.stop[mirror]), "no ray by its ball")
             reasons.setdefault(reason, []).append(mirror + 1)
         return reasons
-
-    def _direct_stop(self) -> int:
-        """The first stop with a photograph, which also shows what is on no mirror."""
-        frames = self.photographs.frames
-        return next((stop for stop, frame in enumerate(frames) if frame is not None), 0)
 
 
 @dataclass(frozen=True)
@@ -114,7 +111,7 @@ def prepared_merge(folder: Path, calibration: Path, exports: Path, options: Merg
     InputError: one cannot be read, they do not belong together, or nothing was photographed.
     """
     run, export = read_run(folder), read_export(exports)
-    check_same_export(run, exports)
+    check_same_export(folder, run.record, exports)
     parts = run.record.machines
     read = [read_machine(calibration / name / RECORD) for name in parts]
     machines = [
@@ -141,38 +138,6 @@ def _halves(
 ) -> list[HalfMerge]:
     """What one machine has photographed: a prototype for both cameras, a shell's camera for one."""
     machine, frames = calibrated
-    _check_size(run, machine, calibration)
-    plan = plan_of(export, run.record.geometry, run.record.frames)
-    corrected = corrections(options, machine.camera)
-    known = stops_known(plan, frames)
-    return [
-        _half(run, plan, known, corrected, half, machine_run(export, plan, machine, frames, half))
-        for half in range(len(TURNS))
-        if (plan.ball[half] != NOT_SERVED).all()
-    ]
-
-
-def _half(
-    run: Run, plan: Plan, known: Bools, corrected: Corrections, half: int, placed: PrototypeRun
-) -> HalfMerge:
-    of_stop = {
-        frame.stop - 1: frame
-        for frame in run.record.frames
-        if frame.object_turn_deg == TURNS[half] and frame.stop <= len(plan.angle)
-    }
-    stops = range(len(plan.angle))
-    frames = tuple(of_stop.get(stop) if known[half, stop] else None for stop in stops)
-    missing = {stop: "the run leaves this stop out" for stop in stops if stop not in of_stop}
-    photographs = CorrectedPhotographs(run, frames, corrected, common_exposure(run), missing)
-    return HalfMerge(placed, photographs, np.zeros(len(placed.stop), dtype=np.int64))
-
-
-def _photographed(half: HalfMerge) -> bool:
-    run, frames = half.photographs.run, half.photographs.frames
-    return any(frame is not None and run.exposure(frame, LIT) is not None for frame in frames)
-
-
-def _check_size(run: Run, machine: Machine, calibration: Path) -> None:
     record, camera = run.record, machine.camera
     if (record.width_px, record.height_px) != (camera.width_px, camera.height_px):
         raise InputError(
@@ -180,6 +145,25 @@ def _check_size(run: Run, machine: Machine, calibration: Path) -> None:
             f"camera of {calibration} {camera.width_px} x {camera.height_px}: calibrate with this "
             "run's camera"
         )
+    plan = plan_of(export, run.record.geometry, run.record.frames)
+    corrected, exposure = corrections(options, machine.camera), common_exposure(run)
+    known, stops = stops_known(plan, frames), range(len(plan.angle))
+    halves = []
+    for half, turn in enumerate(TURNS):
+        if (plan.ball[half] == NOT_SERVED).any():
+            continue
+        of_stop = {f.stop - 1: f for f in run.record.frames if f.object_turn_deg == turn}
+        shown = tuple(of_stop.get(stop) if known[half, stop] else None for stop in stops)
+        missing = {stop: "the run leaves this stop out" for stop in stops if stop not in of_stop}
+        photographs = CorrectedPhotographs(run, shown, corrected, exposure, missing)
+        placed = machine_run(export, plan, machine, frames, half)
+        halves.append(HalfMerge(placed, photographs, np.zeros(len(placed.stop), dtype=np.int64)))
+    return halves
+
+
+def _photographed(half: HalfMerge) -> bool:
+    run, frames = half.photographs.run, half.photographs.frames
+    return any(frame is not None and run.exposure(frame, LIT) is not None for frame in frames)
 
 
 def _facts(
@@ -242,5 +226,4 @@ def based_on(half: HalfMerge) -> dict[str, Any]:
         "photographs_not_used": {name: fault for name, fault in run.faults.items() if name in names}
         | unread,
         "without_dark": sorted(half.photographs.without_dark),
-        "dark_scaled": sorted(half.photographs.dark_scaled),
     }

@@ -14,7 +14,7 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.ball_rays import between_pixels
 from tbcad.options.machines import MergeOptions
 from tbcad.options.shared import AnyPath
-from tbcad.records.run import DARK, DARK_LIT, LIT, Exposure, Frame, dark_factor, exposure_name
+from tbcad.records.run import DARK, DARK_LIT, LIT, Exposure, Frame, exposure_name, same_exposure
 from tbcad.rig.runs import Image16, Run, read_image, read_photograph
 from tbcad.types import Bytes, Floats, Ints
 
@@ -116,11 +116,8 @@ class CorrectedPhotographs:
     exposure_s: float | None  # to which exposure times are brought; None where they are unknown
     # for each stop without a photograph, from 0, why; filled as they are read
     missing: dict[int, str] = field(default_factory=dict)
-    # names of photographs whose dark one is missing or exposed too short to be subtracted; filled
-    # as they are read
+    # names of photographs whose dark one is missing or exposed otherwise; filled as they are read
     without_dark: list[str] = field(default_factory=list)
-    # names of those whose dark one had another exposure, and was scaled; likewise
-    dark_scaled: list[str] = field(default_factory=list)
 
     @property
     def dark_phase(self) -> str:
@@ -147,8 +144,7 @@ class CorrectedPhotographs:
         light = self.corrections.light(read_photograph(self.run, lit), pixel)
         dark = self._dark(frame, lit)
         if dark is not None:
-            image, factor = dark
-            light = light - np.float32(factor) * self.corrections.light(image, pixel)
+            light = light - self.corrections.light(dark, pixel)
         light = self.corrections.corrected(light, pixel, self._factor(lit))
         return self.corrections.encoded(np.einsum("nk,nkc->nc", weight, light))
 
@@ -159,24 +155,18 @@ class CorrectedPhotographs:
             raise InputError(self.run.faults.get(name, f"{name} was not photographed"))
         return found
 
-    def _dark(self, frame: Frame, lit: Exposure) -> tuple[Image16, float] | None:
-        """The photograph without light and its factor, if the run has such and it is usable."""
+    def _dark(self, frame: Frame, lit: Exposure) -> Image16 | None:
+        """The photograph without light, if the run has such and it is usable."""
         if self.dark_phase not in self.run.record.phases:
             return None
-        name = exposure_name(frame, LIT)
         try:
             dark = self._exposure(frame, self.dark_phase)
-            image = read_photograph(self.run, dark)
+            if same_exposure(dark.exposure_s, lit.exposure_s):
+                return read_photograph(self.run, dark)
         except InputError:
-            self.without_dark.append(name)
-            return None
-        factor = dark_factor(dark.exposure_s, lit.exposure_s)
-        if factor is None:
-            self.without_dark.append(name)
-            return None
-        if factor != 1:
-            self.dark_scaled.append(name)
-        return image, factor
+            pass
+        self.without_dark.append(exposure_name(frame, LIT))
+        return None
 
     def _factor(self, exposure: Exposure) -> float:
         if self.exposure_s is None or exposure.exposure_s is None:

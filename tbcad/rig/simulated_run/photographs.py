@@ -109,7 +109,7 @@ class SimulatedRun:
     def _recorded(self, frame: Frame, phase: str, light: Signal | None) -> Image16:
         # Two more than an LED's own number: those before it are of the other phases.
         kind = {DARK: 0, LIT: 1, DARK_LIT: 2}
-        number = kind[phase] if phase in kind else 2 + led_number(phase)
+        number = kind[phase] if phase in kind else 2 + int(phase.removeprefix("led_"))
         stream = (NOISE_STREAM, frame.object_turn_deg, frame.stop, number)
         random, exposure = generator(self.seed, *stream), self.chain.exposure(phase)
         return recorded(self.chain.sensor, self.maps, light, random, exposure)
@@ -141,11 +141,6 @@ class SimulatedRun:
 
     def _turned(self, number: int) -> bool:
         return self.frames[number].object_turn_deg != 0
-
-
-def led_number(phase: str) -> int:
-    """Number of an LED, from 1, by its phase."""
-    return int(phase.removeprefix("led_"))
 
 
 def phases_of(leds: int) -> tuple[str, ...]:

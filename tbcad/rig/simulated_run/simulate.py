@@ -1,15 +1,13 @@
 """Simulate the run of a random build: all photographs, as files of a run's folder."""
 
-import hashlib
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from time import monotonic
-from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -30,12 +28,10 @@ from tbcad.output.single_files import Source, refuse_inputs
 from tbcad.records.run import (
     PHOTOGRAPHS,
     RECORD,
-    Exposure,
     Frame,
     Geometry,
     PhaseTimes,
     RunRecord,
-    exposure_name,
 )
 from tbcad.rig.machine.designed import (
     BuiltPrototype,
@@ -46,7 +42,7 @@ from tbcad.rig.machine.designed import (
 )
 from tbcad.rig.machine.machine import truth_file, write_machine
 from tbcad.rig.machine.shells import perfect_half, random_half, shell_frame
-from tbcad.rig.runs import frames_of
+from tbcad.rig.runs import export_digests, exposure_of, frames_of
 from tbcad.rig.simulated_run.led_light import Occluders, stage_scene
 from tbcad.rig.simulated_run.photographs import (
     EXPOSURE_S,
@@ -71,13 +67,7 @@ PNG_LEVEL = 1
 BEGIN = datetime(2022, 11, 1, tzinfo=UTC)
 
 
-@dataclass(frozen=True)
-class _Subject:
-    """Machines to be photographed, each with its frames, and what is before them."""
-
-    builds: tuple[tuple[BuiltPrototype, tuple[Frame, ...]], ...]
-    scene: SceneObject
-    stage: Any | None
+Builds = tuple[tuple[BuiltPrototype, tuple[Frame, ...]], ...]
 
 
 def prepare_run(
@@ -89,11 +79,14 @@ def prepare_run(
     LEDs, or a shell with planar mirrors, or has not the stops or phases asked for.
     """
     times = PhaseTimes(*exposures(options.exposure_leds, options.exposure_lit))
-    prepared = (_shell if options.shell else _prototype)(export, errors, subject, options)
-    leds = len(prepared.builds[0][0].machine.leds)
+    builds = (_shells if options.shell else _prototype)(export, errors, options)
+    leds = len(builds[0][0].machine.leds)
     phases = times.phases(_chosen_phases(options.phase_names(), phases_of(leds)))
-    scene = prepared_scene(prepared.scene)
-    occluders = Occluders(scene.embree, prepared.stage)
+    # Before a shell nothing stands, and its object is as bright from all sides.
+    lamps = None if options.shell else read_lamps(export.folder)
+    scene = prepared_scene(lit_by(lamps, subject) if lamps else subject)
+    stage = None if options.shell else stage_scene(export.folder)
+    occluders = Occluders(scene.embree, stage)
     chain = ImagingChain(
         SimulatedSensor(bits=options.bits, noise=options.noise),
         dome=dome_radius(export),
@@ -101,7 +94,7 @@ def prepare_run(
         times=times,
     )
     runs = []
-    for whole, every in prepared.builds:
+    for whole, every in builds:
         frames = _chosen_stops(options.stop_numbers(), every)
         kept = np.array([every.index(frame) for frame in frames])
         built = replace(whole, machine=whole.machine.of_frames(kept))
@@ -109,35 +102,29 @@ def prepare_run(
     return tuple(runs), phases
 
 
-def _prototype(
-    export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
-) -> _Subject:
-    """All stops of both runs, the object lit by the prototype's lamps."""
+def _prototype(export: ExportedDesign, errors: Errors, options: SimulateRunOptions) -> Builds:
+    """One build with all stops of both runs."""
     plan = read_plan(export)
-    designed, seed = designed_prototype(export, plan), options.seed
-    built = (
-        designed_build(designed, plan)
-        if options.perfect
-        else random_build(designed, plan, errors, seed, wind_up=read_wind_up(export, plan))
-    )
-    lamps = read_lamps(export.folder)
-    lit = lit_by(lamps, subject) if lamps else subject
-    return _Subject(((built, frames_of(plan.angle)),), lit, stage_scene(export.folder))
+    designed = designed_prototype(export, plan)
+    if options.perfect:
+        built = designed_build(designed, plan)
+    else:
+        wind_up = read_wind_up(export, plan)
+        built = random_build(designed, plan, errors, options.seed, wind_up=wind_up)
+    return ((built, frames_of(plan.angle)),)
 
 
-def _shell(
-    export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
-) -> _Subject:
-    """One frame of each camera, the object as bright from all sides."""
-    builds = []
-    for half in range(len(export.reflectors)):
-        built = (
+def _shells(export: ExportedDesign, errors: Errors, options: SimulateRunOptions) -> Builds:
+    """One frame of each camera."""
+    return tuple(
+        (
             perfect_half(export, half)
             if options.perfect
-            else random_half(export, half, errors, options.seed)
+            else random_half(export, half, errors, options.seed),
+            (shell_frame(half),),
         )
-        builds.append((built, (shell_frame(half),)))
-    return _Subject(tuple(builds), subject, None)
+        for half in range(len(export.reflectors))
+    )
 
 
 def _chosen_phases(asked: tuple[str, ...] | None, every: tuple[str, ...]) -> tuple[str, ...]:
@@ -210,31 +197,19 @@ def _write_frames(
 def _write_photograph(
     folder: Path, frame: Frame, phase: str, image: Image16, seconds: float
 ) -> None:
-    name, data = exposure_name(frame, phase), BytesIO()
-    Image.fromarray(image).save(data, "png", compress_level=PNG_LEVEL)
-    (folder / f"{name}.png").write_bytes(data.getvalue())
-    sidecar = Exposure(
-        frame=frame,
-        phase=phase,
-        file=f"{name}.png",
-        sha256=hashlib.sha256(data.getvalue()).hexdigest(),
-        width_px=image.shape[1],
-        height_px=image.shape[0],
-        exposure_s=seconds,
-        taken=BEGIN,
-        settings={},
-    )
-    sidecar.write(folder / f"{name}.json")
+    file = BytesIO()
+    Image.fromarray(image).save(file, "png", compress_level=PNG_LEVEL)
+    data, size = file.getvalue(), (image.shape[1], image.shape[0])
+    sidecar = exposure_of(frame, phase, (data, ".png", size), seconds, BEGIN)
+    (folder / sidecar.file).write_bytes(data)
+    sidecar.write((folder / sidecar.file).with_suffix(".json"))
 
 
 def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Path) -> RunRecord:
     camera, frames = runs[0].built.machine.camera, tuple(f for run in runs for f in run.frames)
     geometry: Geometry = "prototype" if len(runs) == 1 else "shell"
     return RunRecord(
-        export_sha256={
-            name: hashlib.sha256((export / name).read_bytes()).hexdigest()
-            for name in DEPENDS_ON[geometry]
-        },
+        export_sha256=export_digests(export, DEPENDS_ON[geometry]),
         source="simulated",
         camera=CAMERA,
         width_px=camera.width_px,

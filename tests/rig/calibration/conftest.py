@@ -6,10 +6,11 @@ import pytest
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.rig.calibration.calibrate import MachineCalibration, Setup, calibrate
 from tbcad.rig.calibration.detection.detection import Detection
+from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.calibration.study import designed_setup
 from tbcad.rig.machine.designed import BuiltPrototype, random_build
 from tbcad.tolerancing.process.process import load_process, process_errors
-from tests.rig.calibration.machines import every_highlight
+from tests.rig.calibration.machines import every_highlight, small_machine, small_prior
 
 ERRORS = process_errors(load_process("fdm"))
 FAULT = "LED 3 never lights: its highlights are not used"
@@ -18,6 +19,12 @@ FAULT = "LED 3 never lights: its highlights are not used"
 @pytest.fixture(scope="session")
 def setup(export: ExportedDesign) -> Setup:
     return designed_setup(export)
+
+
+@pytest.fixture(scope="session")
+def prior() -> Prior:
+    """Of five balls at six stops in two runs."""
+    return small_prior(small_machine(stops=6))
 
 
 @pytest.fixture(scope="session")

@@ -85,25 +85,25 @@ def switch_deg(layout: PrototypeLayout) -> float:
     return home_angles(layout, MotionSpec()).switch
 
 
+def closed(rig: Rig) -> Iterator[Rig]:
+    """A rig whose controller is closed after the test."""
+    yield rig
+    rig.controller.close()
+
+
 @pytest.fixture
 def rig(control_export: Path, tmp_path: Path, switch_deg: float) -> Iterator[Rig]:
-    found = connected_rig(control_export, tmp_path, switch_deg)
-    yield found
-    found.controller.close()
+    yield from closed(connected_rig(control_export, tmp_path, switch_deg))
 
 
 @pytest.fixture
 def plain_rig(plain_export: Path, tmp_path: Path, switch_deg: float) -> Iterator[Rig]:
-    found = connected_rig(plain_export, tmp_path, switch_deg, "grbl", angle=0.0)
-    yield found
-    found.controller.close()
+    yield from closed(connected_rig(plain_export, tmp_path, switch_deg, "grbl", angle=0.0))
 
 
 @pytest.fixture
 def klipper_rig(control_export: Path, tmp_path: Path, switch_deg: float) -> Iterator[Rig]:
-    found = klipper_rig_of(control_export, tmp_path, switch_deg)
-    yield found
-    found.controller.close()
+    yield from closed(klipper_rig_of(control_export, tmp_path, switch_deg))
 
 
 @pytest.fixture(params=["rig", "klipper_rig"])

@@ -170,6 +170,9 @@ class KlipperDouble(Double):
     def let_go(self) -> None:
         self.motor_on = False
 
+    def go_away(self) -> None:
+        self.away = True
+
     def _begin(self) -> float:
         return max(self.now + AHEAD_S, self._end)
 

@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
-from threading import Event
+from threading import Timer
 from time import monotonic, sleep
 from typing import Any
 
@@ -134,18 +135,16 @@ class Rig:
     def start(
         self,
         words: list[str],
-        before: Sequence[str] = (),
         module: str = "tests.rig.control.impatient",
-        terminal: int | None = None,
     ) -> "subprocess.Popen[str]":
-        """A command in a process of its own, with the virtual camera; at a terminal, if given."""
+        """A command in a process of its own, with the virtual camera."""
         return subprocess.Popen(
-            [*before, sys.executable, "-m", module, *words],
+            [sys.executable, "-m", module, *words],
             cwd=ROOT,
             env=self.environment(),
-            stdin=subprocess.DEVNULL if terminal is None else terminal,
+            stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE if terminal is None else terminal,
+            stderr=subprocess.PIPE,
             encoding="utf-8",
         )
 
@@ -274,24 +273,14 @@ def killed_run(rig: Rig, camera: str, stops: int, kills: int, seed: int) -> None
 
 
 def kill_after(rig: Rig, words: list[str], lines: int, delay_s: float) -> None:
-    """Kill a command a moment after its controller has some lines; the next line is not answered.
+    """Kill a command a moment after its controller has some lines."""
+    end, process = len(rig.controller.lines) + lines, rig.start(words)
 
-    So a command that is faster than the process that kills it gets no farther.
-    """
-    end = len(rig.controller.lines) + lines
-    killed = Event()
+    def kill(number: int) -> None:
+        if number == end:
+            Timer(delay_s, process.kill).start()
 
-    def hold(number: int) -> None:
-        if number > end:
-            killed.wait()
-
-    rig.controller.on_line = hold
-    process = rig.start(words)
-    until(lambda: len(rig.controller.lines) >= end or process.poll() is not None)
-    sleep(delay_s)
-    code = process.poll()
-    process.kill()
-    output = process.communicate()
+    rig.controller.on_line = kill
+    output = process.communicate(timeout=600)
     rig.controller.on_line = lambda number: None
-    killed.set()
-    assert code is None, output
+    assert process.returncode == -signal.SIGKILL, output

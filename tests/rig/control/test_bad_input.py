@@ -144,5 +144,5 @@ def test_run_that_exists(rig: Rig, tmp_path: Path, refused: Told) -> None:
     rig.export = Path(shutil.copytree(rig.export, tmp_path / "other"))
     edit_json(rig.export / "prototype.json", lambda value: value.update(target_pad_um=11.0))
     line = refused(rig.resume())
-    assert "is a run of another export: prototype.json" in line
+    assert "prototype.json is not the file that" in line
     assert before == {path: path.read_bytes() for path in rig.out.rglob("*") if path.is_file()}

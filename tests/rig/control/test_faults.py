@@ -230,10 +230,10 @@ def test_base_that_does_not_stop_is_not_let_fall(rig: Rig, stopped: Told) -> Non
     controller.deaf = True
 
     def fault(number: int, line: str) -> str | None:
-        if sum(one.startswith("G1 X") for one in controller.lines) == 3 and line.startswith("G4"):
+        third = sum(one.startswith("G1 X") for one in controller.lines) == 3
+        if third and line.startswith("G1 X"):
             controller.run_at(0.1)
-            return "error"
-        return None
+        return "error" if third and line.startswith("G4") else None
 
     controller.fault = fault
     out = stopped(rig.words("--phases", "lit", "--runs", "a", stops="1,30"))

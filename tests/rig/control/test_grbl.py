@@ -9,7 +9,6 @@ from tbcad.rig.control.grbl import Grbl
 from tbcad.rig.control.messages import SerialPort, Status, parse
 from tbcad.rig.control.plan import MachineFault
 from tests.rig.control.grbl_double import GrblDouble
-from tests.rig.control.rig import until
 
 SETTINGS = {1: 255.0, 20: 0.0, 22: 1.0, 25: 360.0, 27: 2.0, 110: 900.0, 120: 50.0, 130: 200.0}
 
@@ -50,16 +49,6 @@ def test_lines_that_are_refused_or_not_sent(homed: Grbl, double: GrblDouble) -> 
         with pytest.raises(MachineFault, match=says):
             homed.command(line)
     assert double.lines[-1] == "$Q"
-
-
-def test_hold_keeps_the_place(homed: Grbl, double: GrblDouble) -> None:
-    double.run_at(1.0)
-    homed.command("G1 X90 F900")
-    until(lambda: double.moving)
-    homed.hold()
-    homed.reset()
-    assert double.state == "Idle"
-    assert -98 < double.machine.angle < 0
 
 
 def test_rest_of_a_line_of_a_killed_program_is_forgotten(double: GrblDouble) -> None:

@@ -2,16 +2,16 @@
 
 import shutil
 import socket
-from collections.abc import Iterator
-from dataclasses import astuple
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from http import HTTPStatus
 from pathlib import Path
 from threading import Thread
+from types import SimpleNamespace
 
 import pytest
 
 from tbcad.app.cli import run as tbcad
-from tbcad.rig.control import klipper, klipper_base
+from tbcad.rig.control import klipper_base
+from tbcad.rig.control.klipper import Moonraker
 from tests.rig.control.conftest import Told
 from tests.rig.control.klipper_double import MOTOR
 from tests.rig.control.rig import Rig, until
@@ -64,32 +64,6 @@ def test_server_that_does_not_listen_or_speak_so(klipper_rig: Rig, refused: Told
     assert "it does not speak https: say http://" in refused(words_to(klipper_rig, secure))
 
 
-class Other(BaseHTTPRequestHandler):
-    """A server that is not Moonraker."""
-
-    def log_message(self, format: str, *args: object) -> None:
-        pass
-
-    def do_GET(self) -> None:
-        code, head, body = self.server.says  # type: ignore[attr-defined]
-        self.send_response(code)
-        for name, value in head.items():
-            self.send_header(name, value)
-        self.end_headers()
-        self.wfile.write(body)
-
-
-@pytest.fixture
-def other() -> Iterator[HTTPServer]:
-    server = HTTPServer(("127.0.0.1", 0), Other)
-    thread = Thread(target=server.serve_forever, args=(0.01,), daemon=True)
-    thread.start()
-    yield server
-    server.shutdown()
-    thread.join()
-    server.server_close()
-
-
 @pytest.mark.parametrize(
     ("code", "head", "body", "says"),
     [
@@ -104,15 +78,15 @@ def other() -> Iterator[HTTPServer]:
 def test_server_that_is_not_moonraker(
     klipper_rig: Rig,
     refused: Told,
-    other: HTTPServer,
+    monkeypatch: pytest.MonkeyPatch,
     code: int,
     head: dict[str, str],
     body: bytes,
     says: str,
 ) -> None:
-    other.says = code, head, body  # type: ignore[attr-defined]
-    port = f"moonraker:http://127.0.0.1:{other.server_port}"
-    assert says in refused(words_to(klipper_rig, port))
+    response = SimpleNamespace(status=code, reason=HTTPStatus(code).phrase, getheader=head.get)
+    monkeypatch.setattr(Moonraker, "_answer", lambda *_: (response, body))
+    assert says in refused(klipper_rig.words())
 
 
 def test_key(klipper_rig: Rig, refused: Told, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,6 +96,7 @@ def test_key(klipper_rig: Rig, refused: Told, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("MOONRAKER_API_KEY", "one\ntwo")
     assert "is no API key" in refused(klipper_rig.words())
     monkeypatch.setenv("MOONRAKER_API_KEY", "1234")
+    klipper_rig.controller.port = klipper_rig.controller.port.replace("http:", "HTTP:") + "/"
     assert tbcad(klipper_rig.words("--phases", "dark", stops="1")) == 0
 
 
@@ -228,18 +203,6 @@ def test_same_values(wanted: str, found: object, same: bool) -> None:
     assert list(klipper_base.differences({"a": {"b": wanted}}, {"a": {"b": found}})) == (
         [] if same else [f"b of [a] is {found!r}, not {wanted}"]
     )
-
-
-@pytest.mark.parametrize(
-    ("text", "address"),
-    [
-        ("http://[::1]", ("::1", 80, "", False)),
-        ("https://printer/", ("printer", 443, "", True)),
-        ("HTTP://Printer:7125/one/", ("printer", 7125, "/one", False)),
-    ],
-)
-def test_addresses_that_are_read(text: str, address: tuple[object, ...]) -> None:
-    assert astuple(klipper.read_address(text)) == address
 
 
 def test_exports_that_are_not_for_klipper(

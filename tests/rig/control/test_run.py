@@ -27,13 +27,19 @@ def test_every_photograph_of_a_run(either_rig: Rig, capsys: pytest.CaptureFixtur
 
 
 def test_what_the_controller_is_sent(rig: Rig) -> None:
-    assert tbcad(rig.words("--phases", "dark,lit")) == 0
+    """Stops are reached from below."""
+    assert tbcad(rig.words("--phases", "dark,lit", "--runs", "b", stops="2,5")) == 0
     lines = rig.controller.lines
     assert "$C" not in lines
     assert lines.index("$H") < lines.index("M64 P0")
-    assert [line for line in lines if line in ("M64 P0", "M8")] == ["M64 P0"] * 4
+    assert [line for line in lines if line in ("M64 P0", "M8")] == ["M64 P0"] * 2
     moves = [index for index, line in enumerate(lines) if line.startswith("G1 ")]
     assert all(lines[index + 1].startswith("G4 P") for index in moves)
+    start, second, fifth, end = (float(lines[at].split("X")[1].split()[0]) for at in moves)
+    assert start < second < fifth
+    assert end == 0
+    run = read_run(rig.out)
+    assert [(one.object_turn_deg, one.stop) for one in run.record.frames] == [(180, 2), (180, 5)]
     assert not rig.controller.machine.lights
     assert rig.controller.machine.angle == pytest.approx(0, abs=0.01)
 
@@ -60,17 +66,6 @@ def test_status_is_asked_for_five_times_a_second_at_most(
     assert tbcad(rig.words("--phases", "dark")) == 0
     assert len(asked) > 5
     assert min(b - a for a, b in pairwise(asked)) >= STATUS_S
-
-
-def test_stops_are_reached_from_below(rig: Rig) -> None:
-    assert tbcad(rig.words("--phases", "dark", "--runs", "b", stops="2,5")) == 0
-    lines = [line for line in rig.controller.lines if line.startswith("G1 ")]
-    angles = [float(line.split("X")[1].split()[0]) for line in lines]
-    start, second, fifth, end = angles
-    assert start < second < fifth
-    assert end == 0
-    run = read_run(rig.out)
-    assert [(one.object_turn_deg, one.stop) for one in run.record.frames] == [(180, 2), (180, 5)]
 
 
 def test_plain_grbl_photographs_the_lit_object_only(plain_rig: Rig) -> None:

@@ -1,22 +1,16 @@
-"""From a simulated machine by way of controller, camera and operator to a view of the object.
+"""From a simulated machine by way of controller and camera to a view of the object.
 
 The camera sees what `tbcad simulate-run` photographs; every step after that is a command. The
-operator sits at a terminal, turns the object when the command asks for it, and says so. The virtual
-camera gives JPEG files only, and asks for a file's size once: photographs are JPEG files of the
-best quality, all filled up to one size.
+object is turned when the base is back at its start after some stops. The virtual camera gives JPEG
+files only, and asks for a file's size once: photographs are JPEG files of the best quality, all
+filled up to one size.
 """
 
 import io
-import os
-import pty
-import subprocess
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
-from shutil import move
 
 import numpy as np
 import pytest
@@ -28,7 +22,7 @@ from tbcad.core.mirrors.array import design
 from tbcad.core.spec.load import load_spec
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.light.simulate.prototype.run import read_plan
-from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
+from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.prototype.balls.layout import prototype_layout
 from tbcad.prototype.drive.balance import home_angles
@@ -44,14 +38,9 @@ from tests.rig.control.rig import (
     SIZE,
     Rig,
     connected_rig,
-    content,
-    journal,
-    killed_run,
 )
 
 NEAR_DEG = 0.05  # of a stop: nearer than any two stops are
-PROMPT = b"done? [Y/n]:"
-STRAIGHT = b"object straight"
 
 
 def jpeg(pixels: np.ndarray) -> bytes:
@@ -69,6 +58,7 @@ class SimulatedScene:
 
     folder: Path  # of the run
     turned: bool = False  # whether the object is turned by 180 degrees
+    _photographed: bool = False  # whether the base was at a stop since it was below all
     _angle: np.ndarray = field(init=False)
     _pictures: dict[tuple[bool, int, frozenset[int]], bytes] = field(init=False)
 
@@ -89,49 +79,12 @@ class SimulatedScene:
         """The photograph of a machine."""
         away = np.abs(self._angle - machine.angle)
         stop = int(away.argmin()) + 1
+        if away.min() < NEAR_DEG:
+            self._photographed = True
+        elif self._photographed and machine.angle < self._angle.min():
+            self.turned, self._photographed = True, False
         at = self.turned, stop, frozenset(machine.lights)
         return self._pictures.get(at, self._nothing) if away.min() < NEAR_DEG else self._nothing
-
-
-@dataclass
-class OperatedRig(Rig):
-    """A rig with an operator, who is asked."""
-
-    scene: SimulatedScene  # before the camera
-
-    def words(self, *more: str, camera: str | None = None, stops: str | None = None) -> list[str]:
-        """A command line of tbcad that asks."""
-        return [
-            word for word in super().words(*more, camera=camera, stops=stops) if word != "--yes"
-        ]
-
-    def start(
-        self,
-        words: list[str],
-        before: Sequence[str] = (),
-        module: str = "tests.rig.control.impatient",
-        terminal: int | None = None,
-    ) -> "subprocess.Popen[str]":
-        """A command in a process of its own, at the operator's terminal."""
-        assert terminal is None
-        screen, terminal = pty.openpty()
-        process = super().start(words, before, module, terminal)
-        os.close(terminal)
-        threading.Thread(target=self._operate, args=(screen,), daemon=True).start()
-        return process
-
-    def _operate(self, screen: int) -> None:
-        """Turn the object as the screen says, and answer that it is done."""
-        shown = b""
-        with suppress(OSError):  # the command has ended
-            while data := os.read(screen, 4096):
-                shown += data
-                if shown.endswith(PROMPT):
-                    question = shown.removesuffix(PROMPT).rpartition(b"\n")[2]
-                    self.scene.turned = STRAIGHT not in question
-                    os.write(screen, b"\n")
-                    shown = b""
-        os.close(screen)
 
 
 pytestmark = [
@@ -140,47 +93,32 @@ pytestmark = [
 ]
 
 DESIGN = ("n=4", "camera.width_px=416", "camera.height_px=310", "prototype.k=5")
-KILLS = 40
 ROUNDING = 2  # levels of 255, by JPEG
 LIKE = 0.99  # SSIM of views that differ by rounding
 
 
 class Loop:
-    """One machine, photographed at once and with kills."""
+    """One machine that was photographed, and all that follows a run."""
 
-    def __init__(self, rig: OperatedRig, stops: int) -> None:
-        self.rig, self.stops = rig, stops
-        self.simulated = rig.scene.folder
-        process = rig.start(rig.words(camera="gphoto2"))
+    def __init__(self, rig: Rig, simulated: Path) -> None:
+        self.rig, self.simulated = rig, simulated
+        process = rig.start(rig.words(camera="gphoto2", stops=None))
         assert "COMPLETE" in process.communicate(timeout=600)[0]
-        self.calibrate_merge_view("whole")
-        killed_run(rig, "gphoto2", stops, KILLS, seed=4)
-        self.calibrate_merge_view("killed")
-
-    def calibrate_merge_view(self, name: str) -> None:
-        """All that follows a run, at the same paths each time, for files may name them."""
-        folder = self.rig.folder
-        run, calibration, captures = self.rig.out, folder / "calibration", folder / "captures"
-        exports = ("--exports", str(self.rig.export))
-        assert tbcad(["calibrate", str(run), *exports, "--out", str(calibration)]) == 0
-        merged_by = ("--calibration", str(calibration), "--out", str(captures))
-        assert tbcad(["merge", str(run), *merged_by]) == 0
-        assert self.view(captures) == 0
-        (folder / name).mkdir()
-        for path in (run, calibration, captures):
-            move(path, folder / name)
-
-    def view(self, captures: Path) -> int:
-        """A view of the merged photographs, beside them."""
-        size = ("--width", "160", "--height", "120", "--out", str(captures / "view.png"))
-        return tbcad(["view", str(captures), "--azimuth", "30", "--elevation", "40", *size])
+        exports = ("--exports", str(rig.export), "--out", str(self.calibration))
+        assert tbcad(["calibrate", str(rig.out), *exports]) == 0
 
     @property
-    def exported(self) -> ExportedDesign:
-        return read_export(self.rig.export)
+    def calibration(self) -> Path:
+        return self.rig.folder / "calibration"
 
-    def folder(self, name: str, what: str) -> Path:
-        return self.rig.folder / name / what
+    def view(self, run: Path, name: str) -> np.ndarray:
+        """A view of the merged photographs of a run."""
+        captures = self.rig.folder / name
+        words = ("--calibration", str(self.calibration), "--exports", str(self.rig.export))
+        assert tbcad(["merge", str(run), *words, "--out", str(captures)]) == 0
+        size = ("--width", "160", "--height", "120", "--out", str(captures / "view.png"))
+        assert tbcad(["view", str(captures), "--azimuth", "30", "--elevation", "40", *size]) == 0
+        return np.asarray(Image.open(captures / "view.png"))
 
 
 @pytest.fixture(scope="module")
@@ -194,14 +132,13 @@ def loop(drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loo
     switch = home_angles(layout, MotionSpec()).switch
     scene = SimulatedScene(simulated)
     controller = connected_rig(exports, folder, switch, view=scene).controller
-    rig = OperatedRig(controller, exports, folder, scene)
-    yield Loop(rig, len(layout.stops.angle))
-    rig.controller.close()
+    yield Loop(Rig(controller, exports, folder), simulated)
+    controller.close()
 
 
 def test_the_camera_gives_what_was_before_it(loop: Loop) -> None:
-    """Each stop and light, of both runs: the operator turned the object between them."""
-    seen, given = (read_run(path) for path in (loop.simulated, loop.folder("whole", "run")))
+    """Each stop and light, of both runs."""
+    seen, given = (read_run(path) for path in (loop.simulated, loop.rig.out))
     assert not given.faults
     assert given.exposures.keys() == seen.exposures.keys()
     for name, exposure in given.exposures.items():
@@ -210,28 +147,16 @@ def test_the_camera_gives_what_was_before_it(loop: Loop) -> None:
         assert np.abs(after.astype(int) - before).max() <= ROUNDING, name
 
 
-def test_kills_leave_the_same_photographs(loop: Loop) -> None:
-    killed = loop.folder("killed", "run")
-    lines = journal(killed)
-    assert [one["event"] for one in lines].count("resumed") > KILLS // 2
-    assert content(killed) == content(loop.folder("whole", "run"))
-
-
-@pytest.mark.parametrize("file", ["captures/lightfield.h5", "captures/view.png"])
-def test_kills_leave_the_same_light_field_byte_for_byte(loop: Loop, file: str) -> None:
-    whole, killed = (loop.folder(name, file).read_bytes() for name in ("whole", "killed"))
-    assert whole == killed
-
-
 def test_the_calibration_finds_the_machine_that_was_seen(loop: Loop) -> None:
     """It tells where highlights are, ten times better than the drawing does."""
     truth, frames = read_machine(loop.simulated / "truth.json")
-    found, known = read_machine(loop.folder("whole", "calibration") / "machine.json")
+    found, known = read_machine(loop.calibration / "machine.json")
     angles = [[one.base_angle_deg for one in each] for each in (known, frames)]
     assert angles[0] == pytest.approx(angles[1], abs=1e-9)  # written, read and turned
     places = [[(one.object_turn_deg, one.stop) for one in each] for each in (known, frames)]
     assert places[0] == places[1]
-    drawn = designed_prototype(loop.exported, read_plan(loop.exported))
+    exported = read_export(loop.rig.export)
+    drawn = designed_prototype(exported, read_plan(exported))
     assert apart_px(found, truth) < apart_px(drawn, truth) / 10
 
 
@@ -244,14 +169,6 @@ def apart_px(one: Machine, other: Machine) -> float:
 
 
 def test_the_view_is_that_of_the_simulated_photographs(loop: Loop) -> None:
-    """Merged without the way through controller, camera and operator."""
-    merged = loop.rig.folder / "direct"
-    calibration = loop.folder("whole", "calibration")
-    words = ("--calibration", str(calibration), "--exports", str(loop.rig.export))
-    assert tbcad(["merge", str(loop.simulated), *words, "--out", str(merged)]) == 0
-    assert loop.view(merged) == 0
-    direct, driven = (
-        np.asarray(Image.open(path / "view.png"))
-        for path in (merged, loop.folder("whole", "captures"))
-    )
+    """Merged without the way through controller and camera."""
+    driven, direct = loop.view(loop.rig.out, "driven"), loop.view(loop.simulated, "direct")
     assert image_quality(direct, driven).ssim > LIKE

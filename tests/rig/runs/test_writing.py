@@ -1,6 +1,5 @@
 """A run's folder after writes that ended anywhere."""
 
-import hashlib
 import io
 import json
 from datetime import UTC, datetime
@@ -9,8 +8,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from tbcad.records.run import Exposure, Frame, RunRecord, exposure_name
-from tbcad.rig.runs import RunWriter, check_new, new_run, read_run, resumed_run
+from tbcad.records.run import Frame, RunRecord
+from tbcad.rig.runs import RunWriter, check_new, exposure_of, new_run, read_run, resumed_run
 from tests.exported_files import contents
 
 FRAMES = tuple(Frame(object_turn_deg=0, stop=stop, base_angle_deg=stop) for stop in (1, 2))
@@ -40,18 +39,8 @@ def writer(tmp_path: Path) -> RunWriter:
     begun.log("started")
     data = image(7)
     for phase in RECORD.phases:
-        exposure = Exposure(
-            frame=FRAMES[0],
-            phase=phase,
-            file=f"{exposure_name(FRAMES[0], phase)}.png",
-            sha256=hashlib.sha256(data).hexdigest(),
-            width_px=32,
-            height_px=16,
-            exposure_s=0.1,
-            taken=datetime.now(UTC),
-            settings={"iso": 100},
-        )
-        begun.add(exposure, data)
+        told = (data, ".png", (32, 16)), 0.1, datetime.now(UTC), {"iso": 100}
+        begun.add(exposure_of(FRAMES[0], phase, *told), data)
     return begun
 
 

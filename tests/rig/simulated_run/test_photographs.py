@@ -11,22 +11,18 @@ from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import Camera, LensCamera, without_distortion
 from tbcad.core.optics.led_dome import dome_images
 from tbcad.core.optics.pedestals.cells import NO_WALLS
-from tbcad.light.simulate.prototype.ball_rays import balls_between, camera_colours, trace_balls
-from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.prototype.ball_rays import balls_between
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
-from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.rig.calibration.detection.matching import expected_highlights
-from tbcad.rig.machine.designed import BuiltPrototype, machine_runs
+from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.rig.machine.machine import Machine
 from tbcad.rig.simulated_run import led_light as module
-from tbcad.rig.simulated_run.led_light import DOME_MM, Occluders, balls_of_frame, led_light
+from tbcad.rig.simulated_run.led_light import Occluders, led_light
 from tbcad.rig.simulated_run.photographs import (
     ImagingChain,
     PointSpread,
     add_points,
     blurred,
-    object_light,
     phases_of,
 )
 from tbcad.rig.simulated_run.sensor import (
@@ -37,7 +33,7 @@ from tbcad.rig.simulated_run.sensor import (
     pixel_maps,
     recorded,
 )
-from tests.simulated_runs import BRIGHT, Small, photograph_centroid, small_run
+from tests.simulated_runs import BRIGHT, Small, small_run
 
 SENSOR = SimulatedSensor(grains=0, hot_share=0.0)
 CAMERA = LensCamera(
@@ -220,45 +216,6 @@ def test_a_photograph_does_not_depend_on_the_others(small: Small, export_folder:
     assert (whole["lit"] == some["lit"]).all()
     other = small.run.frame_photographs(number - 1, ("dark",))["dark"]
     assert (other != whole["dark"]).any()  # noise of its own
-
-
-def test_highlights_are_where_the_machine_shows_them(export_folder: Path) -> None:
-    exact = ImagingChain(
-        SimulatedSensor(noise=0.0, grains=0, hot_share=0.0, bits=16), led_light=BRIGHT
-    )
-    run = small_run(export_folder, STOPS, chain=exact).run
-    images = run.frame_photographs(0, ("led_1", "led_2"))
-    expected = expected_highlights(run.built.machine, DOME_MM)
-    off = []
-    for k in np.flatnonzero((expected.frame == 0) & (expected.led < 2) & expected.inside):
-        place = (expected.pixel + expected.centroid)[k]
-        image = images[f"led_{expected.led[k] + 1}"].astype(float)
-        if image[int(place[1]), int(place[0])] > 5000:
-            light = np.maximum(image - np.median(image), 0)
-            off.append(np.hypot(*(photograph_centroid(light, place, 6) - place)))
-    assert len(off) > 3
-    # What is left of one cycle a pixel moves a centroid by up to a hundredth of a pixel.
-    assert max(off) < 0.03
-
-
-def test_the_lit_object_is_what_a_capture_traces(
-    small: Small, export: ExportedDesign, plan: Plan
-) -> None:
-    run, machine = small.run, small.machine
-    number = 3
-    assert run.frames[number].object_turn_deg == 180
-    directions = pixel_directions(machine.camera)[50:500:3]
-    mine = object_light(
-        machine.camera.pinhole, directions, balls_of_frame(run.built, number), run.scene, True
-    )
-    _, half = machine_runs(export, plan, machine, run.frames)
-    turned = np.array([-1.0, -1.0, 1.0])
-    flat = directions.reshape(-1, 3) * turned
-    stop = np.full(len(flat), run.frames[number].stop - 1)
-    theirs = camera_colours(run.scene, half.camera.pinhole, flat, trace_balls(half, flat, stop))
-    same = np.abs(mine.reshape(-1, 3) - theirs).max(axis=1) < 1
-    assert (theirs.max(axis=1) > 30).sum() > 300
-    assert same.mean() > 0.999
 
 
 def test_light_ends_at_darkness_and_saturation(small: Small) -> None:

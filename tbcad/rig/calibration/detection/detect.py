@@ -1,5 +1,6 @@
 """Find all highlights of a run."""
 
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -8,7 +9,7 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.light.simulate.parallel import THREADS
-from tbcad.records.run import DARK, Frame, dark_factor, exposure_name
+from tbcad.records.run import DARK, Frame, exposure_name, same_exposure
 from tbcad.rig.calibration.detection.detection import (
     Detection,
     Reasons,
@@ -31,7 +32,6 @@ from tbcad.rig.calibration.detection.matching import (
 from tbcad.rig.calibration.detection.spots import (
     ROUNDING,
     BrightSpots,
-    Unmeasured,
     centroid_sigmas,
     find_spots,
     gain,
@@ -53,35 +53,10 @@ class _Read:
     """What a frame's photographs show."""
 
     spots: BrightSpots
-    unmeasured: Unmeasured
+    unmeasured: Counter[str]
     photographed: Bools  # which LEDs' photographs could be read, (l,)
     faults: tuple[str, ...]  # of the others, and of the dark one
     dark: Image16 | None  # the dark photograph, if it could be read
-
-
-@dataclass(frozen=True)
-class _Dark:
-    """A dark photograph, and its exposure time, s, if it is known."""
-
-    image: Image16
-    seconds: float | None
-
-    def at(self, run: Run, frame: Frame, led: int) -> tuple[Image16 | None, str | None]:
-        """What is subtracted from an LED's photograph, and what is to be said of it."""
-        phase = f"led_{led + 1}"
-        seconds = _seconds(run, frame, phase)
-        factor = dark_factor(self.seconds, seconds)
-        if factor == 1:
-            return self.image, None
-        fault = (
-            f"{exposure_name(frame, phase)} was exposed for {seconds:g} s, its dark photograph for "
-            f"{self.seconds:g} s, which is"
-        )
-        if factor is None:
-            return None, f"{fault} too short to be subtracted"
-        kind = self.image.dtype
-        scaled = np.minimum(np.rint(factor * self.image.astype(np.float32)), np.iinfo(kind).max)
-        return scaled.astype(kind), f"{fault} scaled"
 
 
 def detect(
@@ -106,7 +81,7 @@ def detect(
     faults = [*run.faults.values(), *(fault for one in read for fault in one.faults)]
     nothing = partial(
         no_highlights,
-        unmeasured=sum((one.unmeasured for one in read), Unmeasured()),
+        unmeasured=sum((one.unmeasured for one in read), Counter[str]()),
         photographs=int(photographed.sum()),
     )
     try:
@@ -120,9 +95,8 @@ def detect(
         spots = spots.only(move.kept[spots.frame])
         expected, partner, found = match(prior, spots, dome, progress)
         faults.append(_move_line(frames, move, shift_of(expected, left_out)))
-    exposure = _exposures(run, spots, faults)
     hidden = maybe_hidden(found.machine, expected, room)
-    share = relative_light(expected, partner, spots, exposure)
+    share = relative_light(expected, partner, spots)
     reasons = verdicts(expected, partner, spots, share, hidden)
     inside = expected.inside
     reasons[inside & ~photographed[expected.frame, expected.led]] = Rejection.NO_PHOTOGRAPH
@@ -141,85 +115,65 @@ def detect(
 
 
 def _read_frames(run: Run, leds: int, progress: Progress) -> list[_Read]:
-    count = len(run.record.frames)
+    times = [
+        one.exposure_s
+        for one in run.exposures.values()
+        if one.phase.startswith("led_") and one.exposure_s
+    ]
+    usual = float(np.median(times)) if times else None
+    frames = run.record.frames
+    darks = (_photograph(run, frame, DARK, usual)[0] for frame in frames)
+    spare = next((image for image in darks if image is not None), None)  # hot pixels stay
     found: list[_Read] = []
-    spare = _spare_dark(run)
     with ThreadPoolExecutor(THREADS) as pool:
-        for one in pool.map(lambda number: _read_frame(run, number, leds, spare), range(count)):
+        read = partial(_read_frame, run, leds, usual, spare)
+        for one in pool.map(read, range(len(frames))):
             found.append(one)
-            progress(f"frame {len(found)} of {count}")
+            progress(f"frame {len(found)} of {len(frames)}")
     return found
 
 
-def _spare_dark(run: Run) -> _Dark | None:
-    """A dark photograph for frames without one: hot pixels stay."""
-    for frame in run.record.frames:
-        image, _ = _photograph(run, frame, DARK)
-        if image is not None:
-            return _Dark(image, _seconds(run, frame, DARK))
-    return None
-
-
-def _seconds(run: Run, frame: Frame, phase: str) -> float | None:
-    exposure = run.exposure(frame, phase)
-    return None if exposure is None else exposure.exposure_s
-
-
-def _read_frame(run: Run, number: int, leds: int, spare: _Dark | None) -> _Read:
+def _read_frame(
+    run: Run, leds: int, usual: float | None, spare: Image16 | None, number: int
+) -> _Read:
     frame = run.record.frames[number]
-    own, fault = _photograph(run, frame, DARK)
+    own, fault = _photograph(run, frame, DARK, usual)
     faults = [] if fault is None else [fault]
     if own is None:
         what = "without one" if spare is None else "with that of another frame"
         faults.append(f"{exposure_name(frame, DARK)} is not there: its frame goes on {what}")
-    dark = spare if own is None else _Dark(own, _seconds(run, frame, DARK))
-    other_times = []
     found, there = [], np.zeros(leds, dtype=bool)
     for led in range(leds):
-        image, fault = _photograph(run, frame, f"led_{led + 1}")
+        image, fault = _photograph(run, frame, f"led_{led + 1}", usual)
         if fault is not None:
             faults.append(fault)
         if image is not None:
             there[led] = True
-            empty, fault = (None, None) if dark is None else dark.at(run, frame, led)
-            other_times += [] if fault is None else [fault]
-            found.append(find_spots(image, empty, number, led))
-    faults += other_times[:1]
+            found.append(find_spots(image, spare if own is None else own, number, led))
     spots, unmeasured = joined_spots([one for one, _ in found]), (other for _, other in found)
-    whole = sum(unmeasured, Unmeasured())
+    whole = sum(unmeasured, Counter[str]())
     return _Read(spots, whole, there, tuple(faults), own if number < 2 else None)
 
 
-def _photograph(run: Run, frame: Frame, phase: str) -> tuple[Image16 | None, str | None]:
-    """A photograph, or why it cannot be read; neither where the run's faults say so."""
+def _photograph(
+    run: Run, frame: Frame, phase: str, usual: float | None
+) -> tuple[Image16 | None, str | None]:
+    """A photograph, or why it cannot be read; neither where the run's faults say so.
+
+    Of another exposure time than that of most photographs by LEDs, s, it is not used.
+    """
     exposure = run.exposure(frame, phase)
     if exposure is None:
         return None, None
+    if not same_exposure(exposure.exposure_s, usual):
+        return None, (
+            f"{exposure_name(frame, phase)} was exposed for {exposure.exposure_s:g} s and not for "
+            f"{usual:g} s as most photographs by LEDs: it is not used"
+        )
     try:
         return read_photograph(run, exposure), None
     except InputError as error:
         return None, str(error)
-
-
-def _exposures(run: Run, spots: BrightSpots, faults: list[str]) -> Floats:
-    """Exposure time of each spot's photograph over the usual one, (m,)."""
-    frames = run.record.frames
-    times = {
-        (number, led): exposure.exposure_s
-        for number, frame in enumerate(frames)
-        for led in range(int(spots.led.max(initial=-1)) + 1)
-        if (exposure := run.exposure(frame, f"led_{led + 1}")) is not None and exposure.exposure_s
-    }
-    usual = float(np.median(list(times.values()))) if times else 1.0
-    others = [key for key, time in times.items() if time != usual]
-    if others:
-        name = exposure_name(frames[others[0][0]], f"led_{others[0][1] + 1}")
-        faults.append(
-            f"{name} and {len(others) - 1} more were exposed otherwise than the rest, "
-            f"{times[others[0]]:g} s instead of {usual:g} s: their light is scaled"
-        )
-    keys = zip(spots.frame.tolist(), spots.led.tolist(), strict=True)
-    return np.array([times.get(key, usual) / usual for key in keys])
 
 
 def _move_line(frames: tuple[Frame, ...], move: CameraMove, shift: Floats) -> str:

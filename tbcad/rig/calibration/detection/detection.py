@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from tbcad.errors import InputError
 from tbcad.rig.calibration.detection.matching import Expected
-from tbcad.rig.calibration.detection.spots import FULL, BrightSpots, Unmeasured, stacked
+from tbcad.rig.calibration.detection.spots import FULL, BrightSpots, stacked
 from tbcad.rig.machine.machine import Highlights
 from tbcad.types import Bools, Floats, Ints
 
@@ -69,7 +69,7 @@ class Detection:
 
 def no_highlights(
     spots: BrightSpots,
-    unmeasured: Unmeasured,
+    unmeasured: Counter[str],
     photographs: int,
     reasons: Reasons | None = None,
 ) -> InputError:
@@ -90,39 +90,36 @@ def no_highlights(
     return InputError(f"no highlights to calibrate from: {'; '.join(told)}: {step}")
 
 
-def _others(unmeasured: Unmeasured, photographs: int) -> list[str]:
-    large, of = unmeasured.large, f"of {photographs} photographs by LEDs"
+def _others(unmeasured: Counter[str], photographs: int) -> list[str]:
+    large, of = unmeasured["large"], f"of {photographs} photographs by LEDs"
     every = (
-        (large, f"{large} larger than a highlight, {unmeasured.saturated} of them saturated"),
-        (unmeasured.flooded, f"{unmeasured.flooded} {of} are full of light"),
-        (unmeasured.black, f"{unmeasured.black} {of} are black"),
+        (large, f"{large} larger than a highlight, {unmeasured['saturated']} of them saturated"),
+        (unmeasured["flooded"], f"{unmeasured['flooded']} {of} are full of light"),
+        (unmeasured["black"], f"{unmeasured['black']} {of} are black"),
     )
     return [text for number, text in every if number]
 
 
-def _step(spots: int, saturated: int, unmeasured: Unmeasured, photographs: int) -> str:
+def _step(spots: int, saturated: int, unmeasured: Counter[str], photographs: int) -> str:
     """What to do, by what there is most of."""
-    bright = spots + unmeasured.large
-    if unmeasured.flooded > HALF * photographs:
+    bright = spots + unmeasured["large"]
+    if unmeasured["flooded"] > HALF * photographs:
         return f"most are full of light: darken the room, or {SHORTER}"
-    if saturated + unmeasured.saturated > HALF * bright:
+    if saturated + unmeasured["saturated"] > HALF * bright:
         return f"the light is saturated: {SHORTER}"
-    if unmeasured.black > HALF * photographs:
+    if unmeasured["black"] > HALF * photographs:
         return f"most are too dark: {LONGER}"
     return ELSEWHERE
 
 
-def relative_light(
-    expected: Expected, partner: Ints, spots: BrightSpots, exposure: Floats
-) -> Floats:
+def relative_light(expected: Expected, partner: Ints, spots: BrightSpots) -> Floats:
     """Light of each paired highlight over its sphere's and LED's usual light, (n,); else NaN.
 
-    The spot of each is -1 for none, (n,); exposures (m,) are over the usual one.
+    The spot of each is -1 for none, (n,).
     """
     share = np.full(len(partner), np.nan)
     on = partner >= 0
-    spot = partner[on]
-    share[on] = spots.light[spot] / (exposure[spot] * expected.light[on])
+    share[on] = spots.light[partner[on]] / expected.light[on]
     for group in (expected.led, expected.sphere):
         for number in np.unique(group[on]):
             mine = on & (group == number)

@@ -4,6 +4,7 @@ Coordinates are columns and rows; whole numbers are pixel centres. Brightness is
 the file, summed over the three colours.
 """
 
+from collections import Counter
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -58,21 +59,6 @@ class BrightSpots:
         return BrightSpots(**{one.name: getattr(self, one.name)[which] for one in fields(self)})
 
 
-@dataclass(frozen=True)
-class Unmeasured:
-    """Numbers of what is bright and no spot."""
-
-    large: int = 0  # clusters larger than a highlight
-    saturated: int = 0  # of these, with a pixel at the largest number
-    flooded: int = 0  # photographs with more bright pixels than LEDs in balls give
-    black: int = 0  # photographs without any
-
-    def __add__(self, other: "Unmeasured") -> "Unmeasured":
-        return Unmeasured(
-            *(getattr(self, one.name) + getattr(other, one.name) for one in fields(self))
-        )
-
-
 def joined_spots(parts: list[BrightSpots]) -> BrightSpots:
     """All spots of several photographs."""
     if not parts:
@@ -88,13 +74,18 @@ def joined_spots(parts: list[BrightSpots]) -> BrightSpots:
 
 def find_spots(
     image: Image16, dark: Image16 | None, frame: int, led: int
-) -> tuple[BrightSpots, Unmeasured]:
-    """The spots of a photograph (h, w, 3) by one LED, less a dark one, and what else is bright."""
+) -> tuple[BrightSpots, Counter[str]]:
+    """The spots of a photograph (h, w, 3) by one LED, less a dark one, and what else is bright.
+
+    That is counted: clusters larger than a highlight, `saturated` ones of these with a pixel at the
+    largest number; photographs that are `flooded` by more bright pixels than LEDs in balls give, or
+    `black`.
+    """
     largest = np.iinfo(image.dtype).max
     threshold = max(round(THRESHOLD * largest), 1)
     row, column = _bright(image, dark, threshold)
     if not 0 < len(row) <= MAX_BRIGHT:
-        return joined_spots([]), Unmeasured(flooded=int(len(row) > 0), black=int(len(row) == 0))
+        return joined_spots([]), Counter(["flooded" if len(row) else "black"])
     label = _clusters(row, column)
     places = [(row[label == k], column[label == k]) for k in range(int(label.max()) + 1)]
     large = [place for place in places if _radius(place[0]) > MAX_RADIUS_PX]
@@ -104,7 +95,7 @@ def find_spots(
     table[:, -1] /= largest
     frames, leds = np.full(len(table), frame), np.full(len(table), led)
     found = BrightSpots(frames, leds, table[:, :2], *table[:, 2:].T)
-    return found, Unmeasured(len(large), clipped)
+    return found, Counter(large=len(large), saturated=clipped)
 
 
 def _radius(row: Ints) -> float:

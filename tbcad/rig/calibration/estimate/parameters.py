@@ -1,56 +1,71 @@
 """The unknowns of a machine as one vector, in units of their prior standard deviations.
 
 Zero is the prior mean. Blocks follow each other in the order of Block; what is fixed has no place
-in the vector.
+in the vector. A new block is a member of Block, what it does in `Prior.machine`, the derivative
+of that in `sphere_slopes`, and its standard deviation in tbcad.rig.calibration.priors.
 
 Gauge: photographs do not change when camera, axis, spheres and LEDs are moved or rotated together,
 when all lengths grow, when the base's angles are offset and the spheres rotated back, when the
 point of the axis slides along it, or when one of its run-outs is common to all frames. The prior
 alone fixes these; the point slides not at all, and run-out is across the axis only.
-
-Covariance: parameters of one frame (or of one sphere, where there are more spheres than frames)
-touch those of no other, so the information has an arrow's shape. With E these and R the rest,
-
-    C_RR = (H_RR - H_RE H_EE^-1 H_ER)^-1,   K = -H_EE^-1 H_ER,
-    C = [H_EE^-1 + K C_RR K^T, K C_RR; C_RR K^T, C_RR]       (Schur's complement),
-
-and H_EE^-1 has the blocks of H_EE.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array
-from scipy.sparse.csgraph import connected_components
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation
 
+from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import perpendicular_axes
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Bools, Floats, Ints
 
+SMALL = 1e-6  # radians: below, series replace quotients
+
+
+class Of(StrEnum):
+    """What the parameters of a block are of: they repeat for each."""
+
+    MACHINE = "machine"
+    SERIES = "series"
+    LED = "led"
+    SPHERE = "sphere"
+    FRAME = "frame"
+
 
 class Block(StrEnum):
-    """Blocks of the vector, in their order."""
+    """Blocks of the vector, in their order, each with what it is of and its size for each."""
 
-    CAMERA_TURN = "camera_turn"
-    PINHOLE = "pinhole"
-    FOCAL = "focal"
-    PRINCIPAL = "principal"
-    DISTORTION = "distortion"
-    TILT = "axis_tilt"
-    AXIS_POINT = "axis_point"
-    OFFSET = "angle_offset"
-    CARRIER = "carrier"
-    LEDS = "leds"
-    CENTRES = "centres"
-    RADII = "radii"
-    ANGLES = "angles"
-    RUNOUT = "runout"
+    of: Of
+    size: int
 
+    def __new__(cls, name: str, of: Of, size: int) -> "Block":
+        """Keep both beside the name."""
+        block = str.__new__(cls, name)
+        block._value_, block.of, block.size = name, of, size
+        return block
 
-CAMERA = (Block.CAMERA_TURN, Block.PINHOLE, Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION)
+    CAMERA_TURN = "camera_turn", Of.MACHINE, 3  # about the camera's own axes, radians
+    PINHOLE = "pinhole", Of.MACHINE, 3  # mm
+    FOCAL = "focal", Of.MACHINE, 2  # logarithm of both, and of columns over rows
+    PRINCIPAL = "principal", Of.MACHINE, 2  # pixels
+    DISTORTION = "distortion", Of.MACHINE, 5
+    # About two directions across the axis, through the origin and with all spheres, radians.
+    TILT = "axis_tilt", Of.MACHINE, 2
+    AXIS_POINT = "axis_point", Of.MACHINE, 2  # along both, mm
+    OFFSET = "angle_offset", Of.SERIES, 1  # radians
+    # Growth of the spheres' places about the origin, as a share, and shift along the axis, mm.
+    CARRIER = "carrier", Of.MACHINE, 2
+    LEDS = "leds", Of.LED, 3  # mm
+    CENTRES = "centres", Of.SPHERE, 3  # mm
+    RADII = "radii", Of.SPHERE, 1  # mm
+    ANGLES = "angles", Of.FRAME, 1  # radians
+    RUNOUT = "runout", Of.FRAME, 2  # across the axis, mm
 
 
 @dataclass(frozen=True)
@@ -61,14 +76,9 @@ class Prior:
     # number of the series that each frame belongs to, each with an offset of its angles of its own,
     # (f,)
     series: Ints
-    # standard deviations, by block; zero fixes: camera_turn about the camera's own axes, radians,
-    # (3,); pinhole, mm, (3,); focal: logarithm of both, and of columns over rows, (2,); principal,
-    # px, (2,); distortion (5,); axis_tilt about two directions across the axis, through the origin
-    # and with all spheres, radians, (2,); axis_point along both, mm, (2,); angle_offset of each
-    # series, radians, (r,); carrier: growth of the spheres' places about the origin, as a share,
-    # and their shift along the axis, mm, (2,); leds mm, (l, 3); centres mm, (k, 3); radii mm, (k,);
-    # angles of single frames, radians, (f,); runout across the axis, mm, (f, 2)
-    sigma: dict[str, Floats]
+    # standard deviations of all blocks, of r series, l LEDs, k spheres or f frames such as (k, 3),
+    # of one figure each (k,); zero fixes
+    sigma: dict[Block, Floats]
 
     @cached_property
     def flat_sigma(self) -> Floats:
@@ -81,7 +91,7 @@ class Prior:
         return np.flatnonzero(self.flat_sigma > 0)
 
     @cached_property
-    def first(self) -> dict[str, int]:
+    def first(self) -> dict[Block, int]:
         """Number of each block's first parameter."""
         sizes = [self.sigma[block].size for block in Block]
         return dict(zip(Block, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
@@ -91,12 +101,16 @@ class Prior:
         """Two directions across the axis, (2, 3)."""
         return perpendicular_axes(self.mean.axis)
 
-    def is_of(self, *blocks: Block) -> Bools:
-        """Whether free parameters are of some blocks, (q,)."""
-        every = [np.full(self.sigma[block].size, block in blocks) for block in Block]
+    def is_of(self, what: Of) -> Bools:
+        """Whether free parameters are of single frames, spheres ..., (q,)."""
+        every = [np.full(self.sigma[block].size, block.of == what) for block in Block]
         return np.concatenate(every)[self.free]
 
-    def blocks(self, values: Floats) -> dict[str, Floats]:
+    def columns(self, block: Block, number: Ints) -> Ints:
+        """Numbers of the parameters of a block for each frame, sphere ... of (n,), (n, c)."""
+        return self.first[block] + block.size * number[:, None] + np.arange(block.size)
+
+    def blocks(self, values: Floats) -> dict[Block, Floats]:
         """All parameters' values in their own units, of free ones in prior standard deviations."""
         every = np.zeros(len(self.flat_sigma))
         every[self.free] = values * self.flat_sigma[self.free]
@@ -135,81 +149,114 @@ class Prior:
         )
 
 
+def prior_of(machine: Machine, series: Ints, known: Mapping[Block, ArrayLike]) -> Prior:
+    """A prior by standard deviations, each broadcast to its block; the other blocks are fixed.
+
+    Each frame belongs to a series, (f,).
+    """
+    numbers = {
+        Of.SERIES: int(series.max()) + 1,
+        Of.LED: len(machine.leds),
+        Of.SPHERE: len(machine.radius),
+        Of.FRAME: len(machine.angle),
+    }
+    sigma = {}
+    for block in Block:
+        size = (block.size,) if block.size > 1 or block.of is Of.MACHINE else ()
+        shape = size if block.of is Of.MACHINE else (numbers[block.of], *size)
+        sigma[block] = np.broadcast_to(known.get(block, 0.0), shape).astype(np.float64)
+    return Prior(machine, series, sigma)
+
+
 @dataclass(frozen=True)
-class Covariance:
-    """Of free parameters in prior standard deviations."""
+class Slopes:
+    """Derivatives of n groups of d figures by blocks of parameters."""
 
-    inner: Ints  # numbers of the parameters E, (e,)
-    outer: Ints  # numbers of the parameters R, (r,)
-    inverse: csr_array  # of H_EE, (e, e)
-    follows: Floats  # K, (e, r)
-    of_outer: Floats  # C_RR, (r, r)
+    of: Mapping[Of, Ints]  # numbers of the frame, sphere ... that each group is of, (n,)
+    by: dict[Block, Floats]  # derivatives by the parameters that each block has of it, (n, d, c)
 
-    def of(self, slopes: csr_array, size: int) -> Floats:
-        """Covariance of n groups of figures, in the square of their unit, (n, size, size).
-
-        Slopes are derivatives by the parameters, rows group by group, (n * size, q).
-        """
-        inner = slopes[:, self.inner]
-        shape = (slopes.shape[0] // size, size, len(self.outer))
-        through = (inner @ self.follows + slopes[:, self.outer].toarray()).reshape(shape)
-        shared = through @ self.of_outer @ through.swapaxes(1, 2)
-        spread = csr_array(inner @ self.inverse)
-        own = np.zeros(shared.shape)
-        for row in range(size):
-            for column in range(size):
-                product = spread[row::size].multiply(inner[column::size])
-                own[:, row, column] = np.asarray(product.sum(axis=1)).ravel()
-        return np.asarray(shared + own)
-
-    def times(self, vectors: Floats) -> Floats:
-        """The whole covariance times vectors (q, c)."""
-        inner, outer = vectors[self.inner], vectors[self.outer]
-        result = np.empty(vectors.shape)
-        result[self.outer] = self.of_outer @ (self.follows.T @ inner + outer)
-        result[self.inner] = self.inverse @ inner + self.follows @ result[self.outer]
-        return result
-
-    def sigma(self) -> Floats:
-        """Standard deviation of each parameter, in prior standard deviations, (q,)."""
-        result = np.empty(len(self.inner) + len(self.outer))
-        shared = np.einsum("er,rs,es->e", self.follows, self.of_outer, self.follows)
-        result[self.inner] = np.sqrt(shared + self.inverse.diagonal())
-        result[self.outer] = np.sqrt(np.diag(self.of_outer))
-        return result
+    def matrix(self, prior: Prior) -> csr_array:
+        """Rows n * d, by free parameters in prior standard deviations."""
+        value = np.concatenate([*self.by.values()], axis=2)
+        n, d, c = value.shape
+        number = {Of.MACHINE: np.zeros(n, dtype=np.int64), **self.of}
+        columns = [prior.columns(block, number[block.of]) for block in self.by]
+        column = np.repeat(np.concatenate(columns, axis=1)[:, None], d, axis=1)
+        value = value * prior.flat_sigma[column]
+        start = np.arange(n * d + 1) * c
+        shape = (n * d, len(prior.flat_sigma))
+        return csr_array((value.ravel(), column.ravel(), start), shape=shape)[:, prior.free]
 
 
-def covariance(prior: Prior, information: csc_array) -> Covariance:
-    """The inverse of the information of a prior's free parameters, (q, q)."""
-    is_inner = _is_inner(prior)
-    inner, outer = np.flatnonzero(is_inner), np.flatnonzero(~is_inner)
-    rows = csr_array(information)
-    inverse = _block_inverse(csr_array(rows[inner][:, inner]))
-    across = rows[inner][:, outer].toarray()
-    follows = -(inverse @ across)
-    of_outer = np.linalg.inv(rows[outer][:, outer].toarray() + across.T @ follows)
-    return Covariance(inner, outer, inverse, follows, (of_outer + of_outer.T) / 2)
+def sphere_slopes(
+    prior: Prior, values: Floats, machine: Machine, frame: Ints, sphere: Ints
+) -> Slopes:
+    """Derivatives of spheres' centres in frames, (n, 3), by what moves them."""
+    angle = machine.angle[frame]
+    arm = machine.centre[sphere] - machine.axis_point
+    turned = rotated(arm, machine.axis, angle)
+    rotation = _matrices(machine.axis, angle)
+    tilt = prior.tilt(values)
+    on_base = rotation @ tilt.as_matrix()
+    along = np.broadcast_to(prior.mean.axis, arm.shape)
+    about = np.cross(machine.axis, turned)[..., None]
+    tilts = (left_jacobian(tilt.as_rotvec()) @ prior.across.T).T
+    # A sphere c is tilted along, so of its arm c - p only the axis's point p is not.
+    by_tilt = [
+        np.cross(one, turned) + (rotation @ np.cross(one, machine.axis_point)) for one in tilts
+    ]
+    return Slopes(
+        {Of.FRAME: frame, Of.SPHERE: sphere, Of.SERIES: prior.series[frame]},
+        {
+            Block.CARRIER: on_base @ np.stack([prior.mean.centre[sphere], along], axis=2),
+            Block.CENTRES: on_base,
+            Block.TILT: np.stack(by_tilt, axis=2),
+            Block.AXIS_POINT: (np.eye(3) - rotation) @ prior.across.T,
+            Block.OFFSET: about,
+            Block.ANGLES: about,
+            Block.RUNOUT: np.broadcast_to(prior.across.T, (len(frame), 3, 2)),
+        },
+    )
 
 
-def _is_inner(prior: Prior) -> Bools:
-    """Whether free parameters are of one frame, or of one sphere where these are more."""
-    of_frames, of_spheres = (Block.ANGLES, Block.RUNOUT), (Block.CENTRES, Block.RADII)
-    free = [sum(int((prior.sigma[b] > 0).sum()) for b in two) for two in (of_frames, of_spheres)]
-    return prior.is_of(*(of_frames if free[0] > free[1] else of_spheres))
+def base_slopes(prior: Prior, values: Floats) -> Slopes:
+    """Derivatives of spheres' centres at base angle zero and radii, (k, 4), by what moves them."""
+    machine = prior.machine(values)
+    still, every = replace(machine, angle=0 * machine.angle), np.arange(len(machine.radius))
+    moved = sphere_slopes(prior, values, still, 0 * every, every)
+    by = {
+        block: np.pad(moved.by[block], ((0, 0), (0, 1), (0, 0)))
+        for block in (Block.CENTRES, Block.CARRIER, Block.TILT)
+    }
+    by[Block.RADII] = np.broadcast_to(np.eye(4)[:, 3:], (len(every), 4, 1))
+    return Slopes(moved.of, by)
 
 
-def _block_inverse(matrix: csr_array) -> csr_array:
-    count, block = connected_components(matrix, directed=False)
-    order = np.argsort(block, kind="stable")
-    size = np.bincount(block, minlength=count)
-    first = np.cumsum(size) - size
-    rows, columns, values = [], [], []
-    for width in np.unique(size):
-        members = order[first[size == width][:, None] + np.arange(width)]
-        i, j = np.broadcast_arrays(members[:, :, None], members[:, None])
-        dense = np.asarray(matrix[i.ravel(), j.ravel()]).reshape(i.shape)
-        rows.append(i.ravel())
-        columns.append(j.ravel())
-        values.append(np.linalg.inv(dense).ravel())
-    places = np.concatenate(rows), np.concatenate(columns)
-    return csr_array((np.concatenate(values), places), shape=matrix.shape)
+def covariances(covariance: Floats, slopes: csr_array, size: int) -> Floats:
+    """Covariance of n groups of figures, in the square of their unit, (n, size, size).
+
+    By that of the parameters (q, q) and the figures' derivatives by them, (n * size, q), group by
+    group.
+    """
+    spread = slopes @ covariance
+    groups = [(slopes[row::size], spread[row::size]) for row in range(size)]
+    rows = [[one.multiply(to).sum(axis=1) for one, _ in groups] for _, to in groups]
+    return np.asarray(rows).transpose(2, 0, 1)
+
+
+def _matrices(axis: Floats, angle: Floats) -> Floats:
+    """Rotation matrices (n, 3, 3) about an axis (3,) by angles (n,)."""
+    columns = [rotated(np.broadcast_to(one, (len(angle), 3)), axis, angle) for one in np.eye(3)]
+    return np.stack(columns, axis=2)
+
+
+def left_jacobian(turn: Floats) -> Floats:
+    """Small rotation by which exp(turn) changes, by turn, (3, 3) (Sola et al. 2018, eq. 145)."""
+    angle = float(np.linalg.norm(turn))
+    x, y, z = turn
+    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    if angle < SMALL:
+        return np.eye(3) + skew / 2
+    second = (1 - np.cos(angle)) / angle**2
+    third = (angle - np.sin(angle)) / angle**3
+    return np.asarray(np.eye(3) + second * skew + third * skew @ skew)

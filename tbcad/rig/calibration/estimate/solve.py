@@ -18,7 +18,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Covariance, Prior, covariance
+from tbcad.rig.calibration.estimate.parameters import Block, Prior, Slopes, covariances
 from tbcad.rig.machine.machine import Highlights, Machine
 from tbcad.types import Bools, Floats, Progress
 
@@ -61,9 +61,18 @@ class Estimate:
         return np.asarray(length / (self.highlights.sigma * self.noise_factor))
 
     @cached_property
-    def covariance(self) -> Covariance:
-        """Of the free parameters."""
-        return covariance(self.prior, self.information)
+    def covariance(self) -> Floats:
+        """Of the free parameters in prior standard deviations, (q, q)."""
+        return np.linalg.inv(self.information.toarray())
+
+    def sigmas(self) -> dict[Block, Floats]:
+        """Standard deviations of all parameters in their units, by block."""
+        return self.prior.blocks(np.sqrt(np.diag(self.covariance)))
+
+    def covariances(self, slopes: Slopes) -> Floats:
+        """Of n groups of d figures by their derivatives, (n, d, d)."""
+        size = next(iter(slopes.by.values())).shape[1]
+        return covariances(self.covariance, slopes.matrix(self.prior), size)
 
 
 def estimate(
@@ -79,7 +88,9 @@ def estimate(
     problem = _Problem(prior, highlights, every, progress)
     values = np.zeros(len(prior.free)) if start is None else start
     values, steps = _minimum(problem, values, robust=True)
-    problem = replace(problem, noise=_robust_noise(problem, values))
+    # The median hardly changes by outliers; squares have one of 2 log 2.
+    middle = float(np.median(_squares(problem, values)))
+    problem = replace(problem, noise=max(1.0, math.sqrt(middle / (2 * math.log(2)))))
     freedom = 0.0
     for _ in range(MAX_ROUNDS):
         problem = replace(problem, used=_near(problem, values))
@@ -179,12 +190,6 @@ def _factor(information: csc_array) -> SuperLU:
 def _squares(problem: _Problem, values: Floats) -> Floats:
     residual, _ = problem.at(values)
     return np.asarray((residual**2).sum(axis=1) / problem.highlights.sigma**2)
-
-
-def _robust_noise(problem: _Problem, values: Floats) -> float:
-    """Noise by the median, which outliers hardly change; squares have a median of 2 log 2."""
-    median = float(np.median(_squares(problem, values)))
-    return max(1.0, math.sqrt(median / (2 * math.log(2))))
 
 
 def _near(problem: _Problem, values: Floats) -> Bools:

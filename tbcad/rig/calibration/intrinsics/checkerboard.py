@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -48,7 +47,7 @@ class SolvedLens:
     sigma: Floats
     reach: float  # how far out corners lie, as a share of the distance from centre to corner
 
-    def facts(self) -> dict[str, float | int | str]:
+    def facts(self) -> dict[str, float | int]:
         """Further keys of its file."""
         sigmas = {f"sigma_{n}": float(f"{s:.6g}") for n, s in zip(NAMES, self.sigma, strict=True)}
         counts = {"boards": self.boards, "corners": self.corners, "outliers": self.outliers}
@@ -61,8 +60,15 @@ def solve_lens(folder: Path, board: Board, progress: Progress) -> SolvedLens:
     files, seen, size = _photographs(folder), dict[str, BoardCorners](), None
     for file in files:
         progress(file.name)
-        grey = _grey(file)
-        size = _same_size(file, grey, size)
+        image = read_image(file)
+        found = image.shape[1], image.shape[0]
+        if (size := size or found) != found:
+            raise InputError(
+                f"{file} has {found[0]} x {found[1]} pixels, those before it {size[0]} x "
+                f"{size[1]}: keep photographs of one size"
+            )
+        share = (image @ LUMA) / np.iinfo(image.dtype).max
+        grey = np.rint(255 * share).astype(np.uint8)
         corners = find_corners(grey, board)
         if corners is not None:
             seen[file.name] = corners
@@ -84,23 +90,6 @@ def _photographs(folder: Path) -> list[Path]:
         if one.stem == other.stem:
             raise InputError(f"{one} and {other.name} are one photograph twice: keep one of them")
     return files
-
-
-def _grey(file: Path) -> Any:
-    """A photograph as grey of 8 bits, (h, w); luma as ITU-R BT.601 weighs it."""
-    image = read_image(file)
-    share = (image @ LUMA) / np.iinfo(image.dtype).max
-    return np.rint(255 * share).astype(np.uint8)
-
-
-def _same_size(file: Path, grey: Any, size: tuple[int, int] | None) -> tuple[int, int]:
-    found = grey.shape[1], grey.shape[0]
-    if size is not None and found != size:
-        raise InputError(
-            f"{file} has {found[0]} x {found[1]} pixels, those before it {size[0]} x {size[1]}: "
-            "keep photographs of one size"
-        )
-    return found
 
 
 @dataclass(frozen=True)

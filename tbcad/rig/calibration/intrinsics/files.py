@@ -1,9 +1,14 @@
-"""A lens read from a file of OpenCV, ROS, Kalibr, mrcal or COLMAP, recognised by what is in it."""
+"""A lens read from a file of OpenCV, ROS, Kalibr, mrcal or COLMAP, recognised by what is in it.
+
+A file of keys may have those of lens_files.toml and no others: another one may name a model of the
+lens that is not read here.
+"""
 
 import ast
 import re
+import tomllib
 from collections import Counter
-from collections.abc import Iterator
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeAlias
 from xml.etree import ElementTree
@@ -19,35 +24,12 @@ from tbcad.types import Floats
 Tree: TypeAlias = "dict[str, Tree] | list[Tree] | str"
 Node = dict[str, Tree]
 
-SIDE = r"(?P<side>_?(\d|left|right|l|r))?"  # which of several cameras a key is of
-MATRIX = re.compile(
-    rf"(camera_?(matrix|mat)|(camera_?)?intrinsics?_?matrix|intrinsics?|mtx|k|m){SIDE}", re.I
-)
-COEFFICIENTS = re.compile(
-    rf"(dist(ortion)?|(dist(ortion)?_?)?(coeff?s?|coefficients|vector|parameters)|d){SIDE}", re.I
-)
-WIDTH, HEIGHT = (re.compile(rf"((image|img)_?)?{side}", re.I) for side in ("width", "height"))
-SIZE = re.compile(r"((image|img|picture)_?)?size|resolution", re.I)
-BINNING = re.compile(r"binning(_[xy])?", re.I)
-KALIBR = re.compile(r"intrinsics", re.I)
-# Keys that may name a model, those that do if they are not 0, and words that name another one.
-MODEL_KEY = re.compile(r".*model.*|.*(type|projection)|distortion|dist", re.I)
-OTHER_KEY = re.compile(
-    r".*(fish_?eye|omni|equi_?dist|kannala|scaramuzza|ocam|thin_?prism|tilt).*|xi", re.I
-)
-OTHER_VALUE = re.compile(
-    r"fish.?eye|equi|omni|\bfov\b|\bmei\b|kannala|brandt|scaramuzza|ocam|\be?ucm\b|double.?sphere"
-    r"|thin.?prism|tilted|division|cahvor|spline|stereographic|spherical|unified|f.?theta",
-    re.I,
-)
-NO_MODEL_KEY = re.compile(r".*(name|time|comment|note|serial|description|path|file|topic|id)", re.I)
-NO_TYPE_KEY = re.compile(r"dtype|.*(board|target|pattern|sensor|pixel|file|data|image).*", re.I)
-SUPPORTED = {"pinhole", "perspective", "plumbbob", "radtan", "radialtangential", "opencv"}
-SUPPORTED |= {"rationalpolynomial", "pinholeradtan", "pinholeplumbbob"}  # by the coefficients
-OFF, UNNAMED = {"0", "false", "no", "off"}, {"", "none", "null", "~"}
+TABLE = tomllib.loads(files(__package__).joinpath("lens_files.toml").read_text("utf-8"))
+KEYS, MODELS = TABLE["keys"], TABLE["models"]
+OFF = {"", "0", "false", "no", "off"}
 COUNTS = (0, 4, 5, 8, 12, 14)
 SKEW = 1e-6  # of the focal length, that is taken for none
-FULL = {"0", "1"}  # binning of a picture of all pixels
+NO_MATRIX = "has no camera_matrix of 3 x 3 numbers: export it again"
 
 
 def camera_lens(tree: Node, name: str) -> CalibratedLens:
@@ -56,133 +38,79 @@ def camera_lens(tree: Node, name: str) -> CalibratedLens:
     InputError: it has no camera or several, another model of the lens, or a part of the picture's
     pixels.
     """
-    cameras = list(_cameras(tree, ""))
+    inner = {key: node for key, node in tree.items() if isinstance(node, dict)}
+    nodes = {"": tree, **inner}
+    cameras = {label: node for label, node in nodes.items() if node.keys() & {*KEYS["matrix"]}}
     if len(cameras) > 1:
         raise InputError(
-            f"{name} has {len(cameras)} cameras ({', '.join(label for label, *_ in cameras):.80}): "
+            f"{name} has {len(cameras)} cameras ({', '.join(filter(None, cameras)):.80}): "
             "which took the photographs? keep its part of the file"
         )
-    models = list(_models(tree, name))
     if not cameras:
-        raise InputError(f"{name} has no camera_matrix of 3 x 3 numbers: export it again")
-    _, camera, key, side = cameras[0]
-    _check_all_pixels({**tree, **camera}, name)
-    coefficients = _coefficients(camera, side, name)
-    focal_and_principal = _intrinsics(camera, key, models, name)
-    if UNNAMED & {model.lower() for model in models} and numbers_of(coefficients, name).any():
+        raise InputError(f"{name} {NO_MATRIX}")
+    ((label, camera),) = cameras.items()
+    if label:
+        camera = {key: one for key, one in tree.items() if key != label} | camera
+    _check_keys(camera, name)
+    coefficients = _only(camera, "coefficients", name, "distortion_coefficients")
+    if len(coefficients) not in COUNTS:
+        raise InputError(
+            f"{name} has {len(coefficients)} coefficients of distortion, OpenCV's are "
+            f"{', '.join(map(str, COUNTS))}: give k1, k2, p1, p2, k3, of a lens without, zeros"
+        )
+    models = [_plain(str(camera[key])) for key in KEYS["model"] if key in camera]
+    focal_and_principal = _intrinsics(camera, models, name)
+    if {*MODELS["unnamed"]} & {*models} and numbers_of(coefficients, name).any():
         raise InputError(f"{name} names no model of its distortion: {USABLE}")
-    return lens_of(focal_and_principal, coefficients, _size({**tree, **camera}, name), name)
+    return lens_of(focal_and_principal, coefficients, _size(camera, name), name)
 
 
-def _cameras(node: Tree, label: str) -> Iterator[tuple[str, Node, str, str]]:
-    """Label, mapping, key of the matrix and its side, for each camera in a tree."""
-    if isinstance(node, list):
-        for number, inner in enumerate(node):
-            yield from _cameras(inner, f"{label}[{number}]")
-    if not isinstance(node, dict):
-        return
-    for key, value in node.items():
-        found = MATRIX.fullmatch(key)
-        if found and (isinstance(value, list) or (isinstance(value, dict) and "data" in value)):
-            yield label or key, node, key, found["side"] or ""
-        else:
-            yield from _cameras(value, key)
+def _plain(text: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", text.lower())
 
 
-def _models(node: Tree, name: str, key: str = "") -> Iterator[str]:
-    """Names of models in a tree, all of which are supported."""
-    if isinstance(node, str):
-        yield from _model(key, node.strip(), name)
-    elif isinstance(node, dict):
-        for inner, value in node.items():
-            if OTHER_KEY.fullmatch(inner) and isinstance(value, dict):
-                raise _other(inner, "", name)
-            yield from _models(value, name, key if inner == "data" else inner)
-    else:
-        for value in node:
-            yield from _models(value, name, key)
-
-
-def _model(key: str, value: str, name: str) -> Iterator[str]:
-    plain = re.sub(r"[^a-z0-9]", "", value.lower())
-    if OTHER_KEY.fullmatch(key) and plain not in OFF | UNNAMED:
-        raise _other(key, value, name)
-    if NO_MODEL_KEY.fullmatch(key) or OTHER_KEY.fullmatch(key):
-        return
-    if OTHER_VALUE.search(value):
-        raise _other(key, value, name)
-    if MODEL_KEY.fullmatch(key) and not NO_TYPE_KEY.fullmatch(key) and not _is_number(key, value):
-        if plain not in SUPPORTED | UNNAMED:
-            raise _other(key, value, name)
-        yield value
-
-
-def _is_number(key: str, value: str) -> bool:
-    """Whether a text is a number that names no model; "distortion_model: 3" does."""
-    try:
-        float(value)
-    except ValueError:
-        return False
-    return "model" not in key.lower()
-
-
-def _other(key: str, value: str, name: str) -> InputError:
-    said = f"{key:.40}: {value:.40}" if value else f"{key:.40}"
-    return InputError(f"{name} has the lens model {said}: {USABLE}")
-
-
-def _check_all_pixels(camera: Node, name: str) -> None:
-    """Refuse a matrix of all pixels where the pictures have some of them."""
+def _check_keys(camera: Node, name: str) -> None:
+    """Refuse keys that are not known, other models, and a part of the picture's pixels."""
+    kinds = {key: kind for kind, keys in KEYS.items() for key in keys}
+    models = {*MODELS["supported"], *MODELS["unnamed"]}
     for key, value in camera.items():
-        if BINNING.fullmatch(key) and value not in FULL:
+        kind, text = kinds.get(key), str(value).strip()
+        if kind is None:
+            raise InputError(
+                f"{name} has the key {key!r:.40}, which may name another lens model: remove it if "
+                f"it does not; {USABLE}"
+            )
+        if (kind == "model" and _plain(text) not in models) or (
+            kind == "fisheye" and text.lower() not in OFF
+        ):
+            raise InputError(f"{name} has the lens model {key}: {text:.40}: {USABLE}")
+        parts = value.values() if isinstance(value, dict) else [value]
+        whole = OFF if key == "roi" else OFF | {"1"}
+        if kind == "part" and any(str(part).lower() not in whole for part in parts):
             raise InputError(
                 f"{name} has {key}, so the matrix is of another picture: calibrate the photographs "
                 "as they are"
             )
-    region = camera.get("roi", {})
-    if isinstance(region, dict) and any(
-        text not in ("", "0", "false", "False") for text in region.values()
-    ):
-        raise InputError(
-            f"{name} has a roi, so the matrix is of another picture: calibrate the photographs as "
-            "they are"
-        )
 
 
-def _coefficients(camera: Node, side: str, name: str) -> list[str]:
-    found = [
-        value
-        for key, value in camera.items()
-        if (match := COEFFICIENTS.fullmatch(key)) and (match["side"] or "") == side
-        if not isinstance(value, str)  # the name of a model
-    ]
-    flat = [
-        # A mapping without data holds them beside their model.
-        _coefficients(value, "", name)
-        if isinstance(value, dict) and "data" not in value
-        else _numbers(value, name)
-        for value in found
-    ]
-    if not flat or any(one != flat[0] for one in flat):
-        what = "no distortion_coefficients" if not flat else "two lists of distortion coefficients"
-        raise InputError(f"{name} has {what}: give k1, k2, p1, p2, k3, of a lens without, zeros")
-    if len(flat[0]) not in COUNTS:
-        raise InputError(
-            f"{name} has {len(flat[0])} coefficients of distortion, OpenCV's are "
-            f"{', '.join(map(str, COUNTS))}: give k1, k2, p1, p2, k3"
-        )
-    return flat[0]
+def _only(camera: Node, what: str, name: str, usual: str) -> list[str]:
+    """Numbers under the one key of a kind that a camera has."""
+    found = [key for key in KEYS[what] if key in camera]
+    if len(found) != 1:
+        told = f"two of {', '.join(found)}: keep one" if found else f"no {usual}: export it again"
+        raise InputError(f"{name} has {told}")
+    return _numbers(camera[found[0]], name)
 
 
-def _intrinsics(camera: Node, key: str, models: list[str], name: str) -> list[float]:
+def _intrinsics(camera: Node, models: list[str], name: str) -> list[float]:
     """Focal lengths and principal point, from a matrix or Kalibr's four numbers."""
-    numbers = numbers_of(_numbers(camera[key], name), name)
-    if KALIBR.fullmatch(key) and len(numbers) == 4:
+    numbers = numbers_of(_only(camera, "matrix", name, "camera_matrix"), name)
+    if "intrinsics" in camera and len(numbers) == 4:
         if len(models) < 2:
             raise InputError(f"{name} names no camera_model and distortion_model: {USABLE}")
         return list(map(float, numbers))
     if len(numbers) != 9:
-        raise InputError(f"{name} has no camera_matrix of 3 x 3 numbers: export it again")
+        raise InputError(f"{name} {NO_MATRIX}")
     return _of_matrix(numbers.reshape(3, 3), name)
 
 
@@ -202,44 +130,32 @@ def _numbers(node: Tree, name: str) -> list[str]:
         return [node]
     if isinstance(node, list):
         return [text for value in node for text in _numbers(value, name)]
-    values = _numbers(node.get("data", []), name)
+    values = _numbers(node.get("data", "no data"), name)
     shape = [node.get(side) for side in ("rows", "cols")]
     if None not in shape and np.prod(numbers_of(shape, name)) != len(values):
         raise InputError(f"{name}: a matrix has {len(values)} numbers, not rows times cols")
     return values
 
 
-def _size(camera: Node, name: str) -> tuple[Tree, Tree]:
-    widths, heights = _all(camera, WIDTH), _all(camera, HEIGHT)
-    sizes: list[list[Tree]] = [list(pair) for pair in zip(widths, heights, strict=False)]
-    sizes += [[]] if len(widths) != len(heights) else []
-    sizes += [size if isinstance(size, list) else [] for size in _all(camera, SIZE)]
+def _size(camera: Node, name: str) -> list[Tree]:
+    """Columns and rows, which may be told in several ways that agree."""
+    widths, heights, pairs = (
+        [camera[key] for key in KEYS[what] if key in camera] for what in ("width", "height", "size")
+    )
+    sizes = [[*widths, *heights]] if widths or heights else []
+    sizes += [one if isinstance(one, list) else [] for one in pairs]
     if not sizes or any(size != sizes[0] for size in sizes) or len(sizes[0]) != 2:
         what = "no size" if not sizes else "no clear size"
         raise InputError(
             f"{name} has {what} of its pictures: add image_width and image_height, in pixels"
         )
-    width, height = sizes[0]
-    return width, height
-
-
-def _all(camera: Node, key: re.Pattern[str]) -> list[Tree]:
-    return [value for name, value in camera.items() if key.fullmatch(name)]
+    return sizes[0]
 
 
 MAX_BYTES = 2_000_000
 COLMAP_CENTRE = 0.5
 """COLMAP's pixels begin at whole numbers, so their centres are half a pixel farther."""
 COLMAP_CAMERA = re.compile(r"\d+[ \t]+[A-Z][A-Z_]+[ \t]+\d+[ \t]+\d+([ \t]|$)")
-# Each model's parameters in the order focal x, focal y, principal x and y, k1, k2, p1, p2, k3 ...
-COLMAP = {
-    "SIMPLE_PINHOLE": (0, 0, 1, 2),
-    "PINHOLE": (0, 1, 2, 3),
-    "SIMPLE_RADIAL": (0, 0, 1, 2, 3),
-    "RADIAL": (0, 0, 1, 2, 3, 4),
-    "OPENCV": (0, 1, 2, 3, 4, 5, 6, 7),
-    "FULL_OPENCV": tuple(range(12)),
-}
 MRCAL = re.compile(r"LENSMODEL_(PINHOLE|OPENCV(4|5|8|12))")
 MRCAL_FILE = re.compile(r"['\"]lens_?model['\"]\s{0,9}:\s{0,9}b?['\"](LENSMODEL|CAHV)")
 LOADER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
@@ -290,7 +206,7 @@ def _colmap(lines: list[str], name: str) -> CalibratedLens:
     if len(lines) != 1:
         raise InputError(f"{name} has {len(lines)} cameras: keep the line of the run's")
     _, model, width, height, *given = lines[0].split()
-    order = COLMAP.get(model)
+    order = TABLE["colmap"].get(model)
     if order is None:
         raise InputError(f"{name} has the lens model {model:.60}: {USABLE} (model OPENCV)")
     if len(given) != max(order) + 1:

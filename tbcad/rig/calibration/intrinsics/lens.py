@@ -129,31 +129,16 @@ def cv() -> Any:
     return cv2
 
 
-def opencv_text(lens: CalibratedLens, facts: dict[str, float | int | str]) -> str:
+def opencv_text(lens: CalibratedLens, facts: dict[str, float | int]) -> str:
     """A lens as OpenCV's YAML, which cv2.FileStorage and `read_lens` read, with further keys."""
     (fx, fy), (cx, cy) = lens.focal.tolist(), lens.principal.tolist()
-    lines = [
-        "%YAML:1.0",
-        "---",
-        f"image_width: {lens.width_px}",
-        f"image_height: {lens.height_px}",
-        *_yaml_matrix("camera_matrix", (3, 3), [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]),
-        *_yaml_matrix("distortion_coefficients", (5, 1), lens.distortion.tolist()),
-        *(f"{key}: {_yaml(value)}" for key, value in facts.items()),
-    ]
+    matrices = (
+        ("camera_matrix", 3, 3, [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]),
+        ("distortion_coefficients", 5, 1, lens.distortion.tolist()),
+    )
+    lines = ["%YAML:1.0", "---", f"image_width: {lens.width_px}", f"image_height: {lens.height_px}"]
+    for name, rows, columns, values in matrices:
+        lines += [f"{name}: !!opencv-matrix", f"   rows: {rows}", f"   cols: {columns}"]
+        lines += ["   dt: d", f"   data: [ {', '.join(map(repr, values))} ]"]
+    lines += [f"{key}: {value!r}" for key, value in facts.items()]
     return "\n".join(lines) + "\n"
-
-
-def _yaml(value: float | int | str) -> str:
-    return f'"{value}"' if isinstance(value, str) else repr(value)
-
-
-def _yaml_matrix(name: str, shape: tuple[int, int], values: list[float]) -> list[str]:
-    numbers = ", ".join(repr(value) for value in values)
-    return [
-        f"{name}: !!opencv-matrix",
-        f"   rows: {shape[0]}",
-        f"   cols: {shape[1]}",
-        "   dt: d",
-        f"   data: [ {numbers} ]",
-    ]

@@ -1,11 +1,14 @@
 """Plots of a calibration: residuals, their distribution, spheres, and rays."""
 
-from collections.abc import Callable
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tbcad.common.figure_files import PlotFormat, figure_file, legend_below
+from tbcad.common.results import PlotPanel, Series, plot_file
+from tbcad.core.geometry.vectors import norm
+from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.report.recovered import SIGMAS, Kind
 from tbcad.types import Floats
@@ -32,13 +35,14 @@ def plots(
     result: MachineCalibration, spheres: Floats, kind: PlotFormat = "png"
 ) -> dict[str, bytes]:
     """All plots by the names of their files; covariances of spheres in mm^2, (k, 4, 4)."""
-    drawings: dict[str, Callable[[Figure], None]] = {
+    drawn = {
         "residuals": lambda figure: _residual_arrows(figure, result),
-        "residual_distribution": lambda figure: _histogram(figure, result),
         "spheres": lambda figure: _shifts(figure, result, spheres),
-        "rays": lambda figure: _rays(figure, result),
     }
-    return {f"{name}.{kind}": figure_file(draw, INCHES, kind) for name, draw in drawings.items()}
+    panels = {"residual_distribution": _distribution_panel(result), "rays": _rays_panel(result)}
+    files = {name: figure_file(draw, INCHES, kind) for name, draw in drawn.items()}
+    files |= {name: plot_file((panel,), kind) for name, panel in panels.items()}
+    return {f"{name}.{kind}": data for name, data in files.items()}
 
 
 def _residual_arrows(figure: "Figure", result: MachineCalibration) -> None:
@@ -48,48 +52,32 @@ def _residual_arrows(figure: "Figure", result: MachineCalibration) -> None:
     every = max(1, len(found.highlights) // MOST_ARROWS)
     size = np.sqrt((found.residual[found.used] ** 2).sum(axis=1).mean())
     scale = float(size) / (ARROW_SHARE * camera.width_px)
-    for chosen, colour, label in (
-        (np.flatnonzero(found.used)[::every], "C0", "used"),
-        (np.flatnonzero(~found.used), "C1", "outliers, direction only"),
-    ):
-        if not len(chosen):
-            continue
-        place, off = found.highlights.pixel[chosen].T, found.residual[chosen]
-        if label != "used":
-            off = 2 * size * off / np.linalg.norm(off, axis=1)[:, None]
-        style: dict[str, Any] = {
-            "angles": "xy",
-            "scale_units": "xy",
-            "width": 0.0018,
-            "color": colour,
-        }
-        arrows = axes.quiver(*place, *off.T, scale=scale, label=label, **style)
-        if label == "used":
-            axes.quiverkey(arrows, 0.8, 1.03, float(size), f"{size:.3f} px", labelpos="E")
+    style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "width": 0.0018, "scale": scale}
+    used, left_out = np.flatnonzero(found.used)[::every], np.flatnonzero(~found.used)
+    arrows = axes.quiver(
+        *found.highlights.pixel[used].T, *found.residual[used].T, label="used", color="C0", **style
+    )
+    axes.quiverkey(arrows, 0.8, 1.03, float(size), f"{size:.3f} px", labelpos="E")
+    if len(left_out):
+        off = 2 * size * found.residual[left_out] / norm(found.residual[left_out])[:, None]
+        label = "outliers, direction only"
+        axes.quiver(*found.highlights.pixel[left_out].T, *off.T, label=label, color="C1", **style)
     axes.set(xlim=(0, camera.width_px), ylim=(camera.height_px, 0), aspect="equal")
     axes.set(title="Residuals of highlights", xlabel="column, px", ylabel="row, px")
     legend_below(axes)
 
 
-def _histogram(figure: "Figure", result: MachineCalibration) -> None:
+def _distribution_panel(result: MachineCalibration) -> PlotPanel:
     """Residuals in standard deviations, next to the normal law."""
     found = result.found
-    sigma = found.highlights.sigma * found.noise_factor
-    axes = figure.add_subplot()
-    edges = np.linspace(-RANGE, RANGE, BINS + 1).tolist()
+    off = (found.residual / (found.highlights.sigma * found.noise_factor)[:, None])[found.used]
+    edges, x = np.linspace(-RANGE, RANGE, BINS + 1), np.linspace(-RANGE, RANGE, 400)
+    lines = [Series("normal law", x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), "k--")]
     for column, name in enumerate(("columns", "rows")):
-        values = (found.residual[:, column] / sigma)[found.used]
-        axes.hist(values, edges, density=True, histtype="step", color=f"C{column}", label=name)
-    x = np.linspace(-RANGE, RANGE, 400)
-    axes.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), "k--", lw=1, label="normal law")
-    axes.set(yscale="log", ylim=(1e-4, 1))
-    axes.set(
-        title=f"Residuals of {int(found.used.sum())} highlights",
-        xlabel="residual, standard deviations",
-        ylabel="density",
-    )
-    legend_below(axes)
-    axes.grid(True, alpha=0.25)
+        density, _ = np.histogram(off[:, column], edges, density=True)
+        lines.append(Series(name, np.repeat(edges, 2)[1:-1], np.repeat(density, 2), f"C{column}-"))
+    title = f"Residuals of {int(found.used.sum())} highlights"
+    return PlotPanel(title, "residual, standard deviations", "density", tuple(lines), "y")
 
 
 def _shifts(figure: "Figure", result: MachineCalibration, spheres: Floats) -> None:
@@ -127,24 +115,19 @@ def _ellipse(covariance: Floats) -> Floats:
     return np.asarray(vectors @ (np.sqrt(np.maximum(values, 0))[:, None] * ring))
 
 
-def _rays(figure: "Figure", result: MachineCalibration) -> None:
+def _rays_panel(result: MachineCalibration) -> PlotPanel:
     """How well rays are known over the hemisphere, the zenith in the middle."""
     known = result.rays.known
     turned = np.array([result.setup.frames[i].object_turn_deg for i in known.frame]) == 180
-    way = -known.direction * np.where(turned[:, None], [-1.0, -1.0, 1.0], 1.0)
+    way = -known.direction * np.where(turned[:, None], HALF_TURN, np.ones(3))
     from_zenith = np.degrees(np.arccos(np.clip(way[:, 2], -1, 1)))
     level = np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-12)
     x, y = (from_zenith[:, None] * way[:, :2] / level[:, None]).T
-    axes: Axes = figure.add_subplot()
-    points = axes.scatter(x, y, c=known.relative.place_mm, s=14)
-    figure.colorbar(points, ax=axes, label="standard deviation at the object's centre, mm")
-    axes.set_aspect("equal")
-    axes.set(
-        title="Rays of virtual cameras, the zenith in the middle",
-        xlabel="degrees from the zenith, toward x",
-        ylabel="degrees from the zenith, toward y",
-    )
-    axes.grid(True, alpha=0.25)
+    label = "standard deviation at the object's centre, mm"
+    points = Series("", x, y, shade=known.relative.place_mm, shade_label=label)
+    toward = "degrees from the zenith, toward"
+    title = "Rays of virtual cameras, the zenith in the middle"
+    return PlotPanel(title, f"{toward} x", f"{toward} y", (points,))
 
 
 def draw_recovered(figure: "Figure", kinds: tuple[Kind, ...]) -> None:
@@ -173,7 +156,7 @@ def _panel(axes: "Axes", kind: Kind) -> None:
         elinewidth=0.8,
         label=kind.name,
     )
-    axes.set_title(_wrapped(f"{kind.name}, {kind.unit}"), fontsize=7)
+    axes.set_title(textwrap.fill(f"{kind.name}, {kind.unit}", TITLE_LINE), fontsize=7)
     axes.set_xlabel("injected", fontsize=7)
     axes.set_ylabel("recovered", fontsize=7)
     axes.tick_params(labelsize=6)
@@ -197,10 +180,3 @@ def _distribution(axes: "Axes", kinds: tuple[Kind, ...]) -> None:
     axes.set_title("errors over their deviations,\neach kind alike; normal law", fontsize=7)
     axes.tick_params(labelsize=6)
     axes.grid(True, alpha=0.25)
-
-
-def _wrapped(title: str) -> str:
-    if len(title) <= TITLE_LINE:
-        return title
-    middle = title.rfind(" ", 0, TITLE_LINE)
-    return f"{title[:middle]}\n{title[middle + 1 :]}"

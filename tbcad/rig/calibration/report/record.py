@@ -11,8 +11,7 @@ from tbcad.records.calibration import CalibrationRecord, ParameterBlock
 from tbcad.records.document import RecordSection
 from tbcad.records.run import exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration
-from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
-from tbcad.rig.calibration.estimate.parameters import Block
+from tbcad.rig.calibration.estimate.parameters import Block, Of, Slopes, base_slopes
 from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.calibration.report.verdict import CalibrationVerdict, outliers, parameter_names
 from tbcad.rig.machine.designed import is_cap
@@ -51,7 +50,7 @@ def spheres_table(result: MachineCalibration) -> Table:
 def sphere_covariances(result: MachineCalibration) -> Floats:
     """Of each sphere's centre at base angle zero and radius, mm^2, (k, 4, 4)."""
     found = result.found
-    return found.covariance.of(base_slopes(found.prior, found.values).matrix(found.prior), 4)
+    return found.covariances(base_slopes(found.prior, found.values))
 
 
 def angles_table(result: MachineCalibration) -> Table:
@@ -117,21 +116,21 @@ def residuals_table(result: MachineCalibration) -> Table:
 
 def angle_sigmas(found: Estimate) -> Floats:
     """Of each frame's angle, with the offset of its series, radians, (f,)."""
-    prior = found.prior
-    frames = prior.first[Block.ANGLES] + np.arange(len(prior.mean.angle))
-    return _sigmas(found, np.stack([prior.first[Block.OFFSET] + prior.series, frames], axis=1))
+    of, one = _of_frames(found), np.ones((len(found.prior.series), 1, 1))
+    both = found.covariances(Slopes(of, {Block.OFFSET: one, Block.ANGLES: one}))
+    return np.asarray(np.sqrt(both[:, 0, 0]))
 
 
 def _runout_sigmas(found: Estimate) -> Floats:
     """Root mean square of each frame's shift, mm, (f,)."""
-    both = found.prior.first[Block.RUNOUT] + np.arange(2 * len(found.prior.mean.angle))
-    return np.asarray(np.hypot(*(_sigmas(found, both[way::2, None]) for way in (0, 1))))
+    each = np.broadcast_to(np.eye(2), (len(found.prior.series), 2, 2))
+    shift = found.covariances(Slopes(_of_frames(found), {Block.RUNOUT: each}))
+    return np.asarray(np.sqrt(np.trace(shift, axis1=1, axis2=2)))
 
 
-def _sigmas(found: Estimate, columns: Ints) -> Floats:
-    """Of sums of parameters (n, c), (n,)."""
-    slopes = Slopes((columns,), (np.ones((len(columns), 1, columns.shape[1])),))
-    return np.asarray(np.sqrt(found.covariance.of(slopes.matrix(found.prior), 1)[:, 0, 0]))
+def _of_frames(found: Estimate) -> dict[Of, Ints]:
+    series = found.prior.series
+    return {Of.FRAME: np.arange(len(series)), Of.SERIES: series}
 
 
 def calibration_record(
@@ -183,7 +182,7 @@ def covariance_bytes(result: MachineCalibration) -> bytes:
 def _parameters(result: MachineCalibration) -> dict[str, ParameterBlock]:
     """Each block's priors and results: deviations before and after, median of its parameters."""
     found = result.found
-    before, after = found.prior.sigma, found.prior.blocks(found.covariance.sigma())
+    before, after = found.prior.sigma, found.sigmas()
     return {
         block: _short(
             ParameterBlock(

@@ -12,8 +12,7 @@ from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.rig.calibration.calibrate import MachineCalibration
-from tbcad.rig.calibration.estimate.jacobian import Slopes, base_slopes
-from tbcad.rig.calibration.estimate.parameters import Block
+from tbcad.rig.calibration.estimate.parameters import Block, Of, Slopes, base_slopes
 from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.calibration.report.record import angle_sigmas
 from tbcad.rig.calibration.uncertainty import FIGURES, motion_fit, shared_motions
@@ -55,7 +54,7 @@ def recovered_errors(result: MachineCalibration, truth: Machine) -> tuple[Kind, 
     spheres, besides = _sphere_sigmas(result, rest)
     width = np.concatenate([prior.sigma[block] for block in LENS])
     width = np.where(width > 0, width, 1.0)
-    of, axes = prior.blocks(result.found.covariance.sigma()), designed.camera.axes
+    of, axes = result.found.sigmas(), designed.camera.axes
     lens = np.concatenate([of[block] for block in LENS])
     rows: tuple[tuple[str, str, float, Callable[[Machine], Floats], Floats], ...] = (
         ("centres", "um", MICROMETRES, lambda one: one.centre, spheres[:, :3]),
@@ -106,7 +105,7 @@ def recovered_table(kinds: tuple[Kind, ...]) -> Table:
 def _sphere_sigmas(result: MachineCalibration, rest: Floats) -> tuple[Floats, Floats]:
     """Of centres and radii, mm, (k, 4), and of centres besides a motion and growth of all."""
     slopes = base_slopes(result.found.prior, result.found.values).matrix(result.found.prior)
-    covariance = np.asarray(slopes @ result.found.covariance.times(slopes.T.toarray()))
+    covariance = np.asarray(slopes @ (result.found.covariance @ slopes.T))
     sigma = np.sqrt(np.diag(covariance)).reshape(-1, 4)
     of_centres = np.arange(sigma.size).reshape(-1, 4)[:, :3].ravel()
     besides = rest @ covariance[np.ix_(of_centres, of_centres)] @ rest.T
@@ -133,16 +132,11 @@ def _base_places(machine: Machine, across: Floats) -> Floats:
 def _place_sigmas(result: MachineCalibration) -> Floats:
     """Of what `_base_places` gives, by the point of the axis and its run-out, mm, (f, 2)."""
     prior, angle = result.found.prior, result.found.machine.angle
-    frames = np.arange(len(angle))
     ways = [np.broadcast_to(one, (len(angle), 3)) for one in prior.across]
     turned = np.stack([rotated(one, prior.mean.axis, angle) for one in ways], axis=2)
     by_point = np.eye(2) - prior.across @ turned
-    columns = (
-        prior.first[Block.AXIS_POINT] + np.arange(2),
-        prior.first[Block.RUNOUT] + 2 * frames[:, None] + np.arange(2),
-    )
-    values = (by_point, np.broadcast_to(np.eye(2), by_point.shape))
-    covariance = result.found.covariance.of(Slopes(columns, values).matrix(prior), 2)
+    by = {Block.AXIS_POINT: by_point, Block.RUNOUT: np.broadcast_to(np.eye(2), by_point.shape)}
+    covariance = result.found.covariances(Slopes({Of.FRAME: np.arange(len(angle))}, by))
     return np.asarray(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
 
 
@@ -152,15 +146,6 @@ def _lens(machine: Machine) -> Floats:
     logarithm = np.log(camera.focal)
     focal = [logarithm.mean(), logarithm[0] - logarithm[1]]
     return np.concatenate([focal, camera.principal, camera.distortion])
-
-
-@dataclass(frozen=True)
-class RayErrors:
-    """Errors of m rays that show the object's centre: place in mm, direction in radians."""
-
-    whole: Floats  # in the frame of the design, (m, 4)
-    relative: Floats  # besides the motion of all rays that fits them best, (m, 4)
-    in_run: Floats  # besides such a motion in each run, (m, 4)
 
 
 def place_mm(errors: Floats) -> Floats:
@@ -173,8 +158,12 @@ def turn_mrad(errors: Floats) -> Floats:
     return 1000 * norm(errors[:, 2:])
 
 
-def ray_errors(found: Estimate, truth: Machine, frame: Ints, sphere: Ints) -> RayErrors:
-    """Errors of rays of spheres (m,) in frames (m,), through the pixels that show the centre."""
+def ray_errors(found: Estimate, truth: Machine, frame: Ints, sphere: Ints) -> tuple[Floats, Floats]:
+    """Errors of rays of spheres (m,) in frames (m,), through the pixels that show the centre.
+
+    Place in mm, direction in radians, (m, 4): besides the motion of all rays that fits them best,
+    and besides such a motion in each run.
+    """
     machine = found.machine
     pixel = centre_pixels(machine, frame, sphere)
     _, direction = traced(machine, pixel, frame, sphere)
@@ -182,11 +171,11 @@ def ray_errors(found: Estimate, truth: Machine, frame: Ints, sphere: Ints) -> Ra
     across = perpendicular_axes(direction)
     away = at_plane(start, true_direction, direction), true_direction - direction
     errors = np.concatenate([(across @ one[..., None])[..., 0] for one in away], axis=1).ravel()
-    besides = [
-        errors - motions @ (motion_fit(motions) @ errors)
+    relative, in_run = (
+        (errors - motions @ (motion_fit(motions) @ errors)).reshape(-1, FIGURES)
         for motions in shared_motions(found.prior, frame, direction)
-    ]
-    return RayErrors(*(one.reshape(-1, FIGURES) for one in (errors, *besides)))
+    )
+    return relative, in_run
 
 
 def traced(machine: Machine, pixel: Floats, frame: Ints, sphere: Ints) -> tuple[Floats, Floats]:

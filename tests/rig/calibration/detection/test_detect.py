@@ -20,7 +20,7 @@ from tbcad.rig.calibration.detection.matching import (
     expected_highlights,
     highlights_of,
 )
-from tbcad.rig.calibration.detection.spots import Unmeasured, find_spots
+from tbcad.rig.calibration.detection.spots import find_spots
 from tbcad.rig.machine.machine import Highlights
 from tbcad.rig.runs import read_image, read_run
 from tbcad.rig.simulated_run.photographs import ImagingChain
@@ -188,29 +188,19 @@ def edit(run: Path, name: str, **changes: object) -> None:
     edit_json(run / "photographs" / f"{name}.json", lambda record: record.update(changes))
 
 
-def test_another_exposure_is_named_and_scaled(copied: Path, small: Small) -> None:
-    name = exposure_name(small.run.frames[5], "led_1")
+@pytest.mark.parametrize("phase", ["led_1", "dark"])
+def test_another_exposure_is_named_and_not_used(
+    copied: Path, small: Small, whole: Detection, phase: str
+) -> None:
+    name = exposure_name(small.run.frames[5], phase)
     edit(copied, name, exposure_s=0.5)
     found = detected(copied, small)
-    assert f"{name} and 0 more were exposed otherwise" in " ".join(found.faults)
-    # Its light is as before, so it now seems twice too bright.
-    assert Rejection.MERGED in {
-        why for (frame, _, led), why in found.rejected.items() if (frame, led) == (5, 0)
-    }
-
-
-@pytest.mark.parametrize(("seconds", "says"), [(2.0, "scaled"), (0.1, "too short")])
-def test_a_dark_photograph_of_another_exposure(
-    copied: Path, small: Small, whole: Detection, seconds: float, says: str
-) -> None:
-    frame = small.run.frames[3]
-    edit(copied, exposure_name(frame, "dark"), exposure_s=seconds)
-    found = detected(copied, small)
-    (line,) = found.faults
-    name = exposure_name(frame, "led_1")
-    assert line.startswith(f"{name} was exposed for 1 s, its dark photograph for {seconds:g} s")
-    assert says in line
-    assert len(found.highlights) == pytest.approx(len(whole.highlights), abs=2)
+    says = f"{name} was exposed for 0.5 s and not for 1 s as most photographs by LEDs: it is not"
+    assert says in " ".join(found.faults)
+    absent = {why for (frame, _, led), why in found.rejected.items() if (frame, led) == (5, 0)}
+    assert (Rejection.NO_PHOTOGRAPH in absent) == (phase == "led_1")
+    if phase == "dark":
+        assert len(found.highlights) == pytest.approx(len(whole.highlights), abs=2)
 
 
 @pytest.mark.parametrize(
@@ -251,11 +241,11 @@ def test_light_larger_than_a_highlight() -> None:
     image[50:54, 200:204] = 200
     spots, other = find_spots(image, None, 0, 0)
     assert len(spots) == 1
-    assert other == Unmeasured(large=2, saturated=1)
+    assert other == Counter(large=2, saturated=1)
     flood = np.full((800, 800, 3), 200, np.uint8)
-    assert find_spots(flood, None, 0, 0)[1] == Unmeasured(flooded=1)
-    assert find_spots(0 * flood, None, 0, 0)[1] == Unmeasured(black=1)
-    error = str(no_highlights(spots, other + other + Unmeasured(flooded=3), 4))
+    assert find_spots(flood, None, 0, 0)[1] == Counter(flooded=1)
+    assert find_spots(0 * flood, None, 0, 0)[1] == Counter(black=1)
+    error = str(no_highlights(spots, other + other + Counter(flooded=3), 4))
     assert "4 larger than a highlight, 2 of them saturated" in error
     assert "most are full of light: darken the room" in error
 
