@@ -21,6 +21,7 @@ from tbcad_verify.mesh.rays import RayScene
 from tbcad_verify.prototype import (
     assembly,
     bodies,
+    bodies_apart,
     camera_gauge_checks,
     caps,
     cut_checks,
@@ -28,6 +29,7 @@ from tbcad_verify.prototype import (
     measured_parts,
     seats,
     stage_checks,
+    swing,
 )
 from tbcad_verify.prototype import stages as prototype_stages
 from tbcad_verify.prototype.bodies import Bodies, MeasuredPrototype
@@ -64,7 +66,7 @@ PURE: dict[Any, tuple[str, ...]] = {
     verification: ("area_checks",),
     shell_checks: ("wall", "cells_of_export"),
     prototype_stages: ("measure_part", "joined_meshes"),
-    prototype_stages.bodies_apart: ("overlaps",),
+    bodies_apart: ("overlaps",),
     measured_parts: ("manifold",),
     assembly: ("manifold", "read_solids"),
     bodies: ("_scene", "join_meshes", "build_scene"),
@@ -89,11 +91,11 @@ def remembered() -> Iterator[None]:
     keyed: tuple[tuple[Any, str, Callable[..., object]], ...] = (
         (stages, "read_facets", _file_key),
         (stages, "read_3mf", _file_key),
-        (assembly, "assembly_meshes", _drawn_key),
-        (prototype_stages.ball_views, "ball_views", _traced_key),
-        (prototype_stages.swing, "axial_solid", _solid_key),
-        (prototype_stages.swing, "sweep", _sweep_key),
-        (prototype_stages.ball_views, "pixel_rays", _rays_key),
+        (prototype_stages, "assembly_meshes", _drawn_key),
+        (prototype_stages, "ball_views", _traced_key),
+        (swing, "axial_solid", _solid_key),
+        (swing, "sweep", _sweep_key),
+        (prototype_stages, "pixel_rays", _rays_key),
         (lamp_light, "irradiance", _light_key),
         *((module, name, _given) for module, names in PURE.items() for name in names),
     )

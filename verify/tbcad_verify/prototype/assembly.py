@@ -19,6 +19,7 @@ from tbcad_verify.prototype.glb import read_glb
 from tbcad_verify.prototype.measured_parts import MeasuredPart, manifold
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
+from tbcad_verify.record.prototype import RECORD
 from tbcad_verify.record.prototype_sections import PrintedPart
 from tbcad_verify.report.checks import (
     Check,
@@ -36,6 +37,7 @@ from tbcad_verify.types import Floats, Ints
 
 Shape = tuple[Floats, Ints]  # corners (V, 3) in mm, facets (F, 3)
 
+FILE = RECORD
 CHECKS = {"inventory": "faults", "leds as designed": "faults", "assembly step": "mm"}
 TURNING = frozenset({"wheel", "shaft", "collar", "coupling", "rotary_stage_top"})
 VIEWS = frozenset({"capture_sphere", "camera_view"})

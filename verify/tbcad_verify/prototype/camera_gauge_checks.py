@@ -16,6 +16,7 @@ from tbcad_verify.mesh.rays import build_scene, distances_to_planes, first_hits
 from tbcad_verify.mesh.vectors import distances_to_segments, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, of_roles
+from tbcad_verify.record.prototype import RECORD
 from tbcad_verify.record.prototype_sections import CameraPlace
 from tbcad_verify.report.checks import Check, CheckName, Unknown, informative, no_faults, require
 from tbcad_verify.types import Floats
@@ -27,6 +28,7 @@ BEFORE_MM = 3.0  # of a hit from the mark it belongs to
 PRESSED_MM3 = 5.0  # that the plug may share with the hub
 CLEAR_MM, STEP_DEG = 1.0, 15.0
 SIDES = {"positive": 0, "negative": 1}
+FILE = RECORD
 CHECKS = {"camera gauge": "faults"}
 
 

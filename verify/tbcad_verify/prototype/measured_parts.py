@@ -38,6 +38,7 @@ ROTATION = 1e-9  # largest deviation of the axes from a rotation
 BED_MM = 0.05
 # Round bosses meet ribs in grooves that run out to a few degrees; a sharper bend is a fold.
 FOLD_RAD = 0.02
+PLACED = ("base", "cap", "stage", "frame")  # roles of the parts that are in the prototype
 POSE = {"print pose": "off a rotation", "on the bed": "mm"}
 
 

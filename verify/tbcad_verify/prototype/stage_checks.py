@@ -9,7 +9,7 @@ import numpy as np
 from tbcad_verify.mesh.rays import build_scene, distances_to_planes, first_hits
 from tbcad_verify.mesh.vectors import norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes
+from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, of_roles
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -21,6 +21,7 @@ from tbcad_verify.report.checks import (
 )
 from tbcad_verify.types import Bools, Floats
 
+FILE = ("stage", "frame")
 CHECKS = {
     "object room": "mm^3",
     "leds seen": "LEDs",
@@ -33,13 +34,14 @@ ROOM_SIDES = 180
 
 
 def checks(
-    names: list[CheckName], context: PrototypeContext, fixed: list[MeasuredPart]
+    names: list[CheckName], context: PrototypeContext, parts: list[MeasuredPart]
 ) -> list[Check]:
     """Room and LEDs against the parts of stage and frame.
 
     Every LED is inside the capture sphere.
     """
     room, seen, inside = names
+    fixed = of_roles(parts, *FILE)
     leds = context.prototype.leds
     volume, filled = _volume_in_room(context, fixed)
     empty = at_most(room, volume, ROOM_MM3, f"in the object's room: {short_list(filled)}")

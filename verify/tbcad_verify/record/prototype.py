@@ -45,7 +45,7 @@ from tbcad_verify.record.validation import (
 )
 
 SCHEMA = "tbcad-prototype/2"
-RECORD = "prototype.json"
+RECORD, GLB = "prototype.json", "prototype.glb"
 PLATE_HOLES = "plate_holes.csv"
 BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"
 SETTINGS = "grbl_settings.txt"

@@ -29,6 +29,7 @@ from tbcad_verify.prototype.light.ray_paths import (
     ray_transfer,
     rotated,
 )
+from tbcad_verify.prototype.measured_parts import PLACED
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -40,6 +41,7 @@ from tbcad_verify.report.checks import (
 )
 from tbcad_verify.types import Bools, Floats, Ints
 
+FILE = PLACED
 CHECKS = {
     "cells": "directions",
     "coverage, balls": "mm",
