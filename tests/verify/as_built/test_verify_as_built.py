@@ -16,7 +16,7 @@ from tbcad_verify.cli import main
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.surfaces import Surfaces, prepare_for_rays
 from tbcad_verify.mesh.vectors import unit
-from tbcad_verify.prototype.bodies import MeasuredPrototype, Obstacles
+from tbcad_verify.prototype.bodies import BodyScene, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light.ball_views import ball_coverage, ended_on_balls, outline_coverage
 from tbcad_verify.prototype.light.pinhole_cells import cell_outlines, mirror_spheres
@@ -97,7 +97,7 @@ def judged(prototype: Path, calibration: Callable[[], Path]) -> Judged:
 
 def designed_coverage(context: PrototypeContext) -> np.ndarray:
     """Coverage of each ball as the verification of the files has it, on the record's balls."""
-    balls, none = context.prototype.balls, Obstacles(None, np.full(1, -1), ())
+    balls, none = context.prototype.balls, BodyScene(None, np.full(1, -1), ())
     centre, normal = balls.columns("cx", 3), unit(balls.columns("nx", 3))
     radius = balls.radius_mm
     surfaces = Surfaces(centre + radius * normal, normal, 1 / radius)

@@ -22,13 +22,11 @@ from tbcad_verify.prototype import (
     assembly,
     bodies,
     bodies_apart,
-    camera_gauge_checks,
     caps,
     cut_checks,
     fastener_checks,
     measured_parts,
     seats,
-    stage_checks,
     swing,
 )
 from tbcad_verify.prototype import stages as prototype_stages
@@ -69,8 +67,7 @@ PURE: dict[Any, tuple[str, ...]] = {
     bodies_apart: ("overlaps",),
     measured_parts: ("manifold",),
     assembly: ("manifold", "read_solids"),
-    bodies: ("_scene", "join_meshes", "build_scene"),
-    camera_gauge_checks: ("joined_meshes", "build_scene"),
+    bodies: ("indexed_mesh", "join_meshes", "build_scene"),
     caps: ("fit_sphere",),
     cut_checks: ("read_dxf",),
     fastener_checks: ("_hole_spans",),
@@ -78,7 +75,6 @@ PURE: dict[Any, tuple[str, ...]] = {
     homing_checks: ("run_program",),
     klipper_checks: ("run_klipper",),
     seats: ("_facets_near", "_pad", "distance_to_facets"),
-    stage_checks: ("joined_meshes", "build_scene"),
 }
 
 

@@ -21,7 +21,6 @@ from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light import ball_views, pinhole_cells, ray_paths
 from tbcad_verify.prototype.measured_parts import (
     MeasuredPart,
-    joined_meshes,
     measure_part,
     of_roles,
 )

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tbcad_verify.mesh.mesh import indexed_mesh, join_meshes
-from tbcad_verify.mesh.rays import RayScene, build_scene
+from tbcad_verify.mesh.mesh import Mesh, indexed_mesh, join_meshes
+from tbcad_verify.mesh.rays import RayScene, build_scene, distances_to_planes, first_hits
 from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype.assembly import VIEWS, Shape
@@ -24,7 +24,7 @@ from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Bools, Floats, Ints
 
 OWN = ("camera",)  # body that its own rays start in
-SWUNG = ("base", "cap")  # roles of printed parts that turn with the base
+SWUNG, STILL = ("base", "cap"), ("stage", "frame")  # roles of parts that turn with the base or not
 LEAST_ANGLES = 7
 LIFT_MM = 1e-3
 
@@ -33,22 +33,37 @@ LIFT_MM = 1e-3
 class BodyScene:
     """Bodies that rays meet."""
 
-    embree: object  # the committed scene; None without any body
-    owner: Ints  # (F,) number of each facet's body
+    scene: RayScene | None  # all of them; None without any
+    owner: Ints  # (F + 1,) number of each facet's body; -1 at the end, for no facet
     names: tuple[str, ...]  # of the bodies
 
     def first(self, origin: Floats, along: Floats) -> tuple[Ints, Floats]:
-        """Number of the body that rays (N, 3) meet first, -1 for none, and its distance, mm."""
-        body = np.full(len(origin), -1, dtype=np.int64)
-        distance = np.full(len(origin), np.inf)
-        if self.embree is not None and len(origin):
-            found = self.embree.run(  # type: ignore[attr-defined]
-                origin.astype(np.float32), along.astype(np.float32), output=1
-            )
-            hit = found["primID"] >= 0
-            body[hit] = self.owner[found["primID"][hit]]
-            distance[hit] = found["tfar"][hit]
-        return body, distance
+        """Number of the body that rays (3, N) meet first, -1 for none, and its distance, mm."""
+        distance = np.full(along.shape[1], np.inf)
+        if self.scene is None:
+            return np.full(distance.size, -1), distance
+        facet = first_hits(self.scene, origin, along)
+        hit = np.flatnonzero(facet >= 0)
+        distance[hit] = distances_to_planes(self.scene, facet[hit], origin[:, hit], along[:, hit])
+        return self.owner[facet], distance
+
+
+def body_scene(meshes: Mapping[str, Mesh]) -> BodyScene:
+    """Bodies by name, prepared for rays."""
+    if not meshes:
+        return BodyScene(None, np.full(1, -1), ())
+    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes.values()])
+    scene = build_scene(join_meshes([*meshes.values()]))
+    return BodyScene(scene, np.append(owner, -1), tuple(meshes))
+
+
+def placed_meshes(parts: list[MeasuredPart]) -> dict[str, Mesh]:
+    """Meshes of parts in their places, by name. Unknown: one could not be measured."""
+    return {part.part.name: part.placed_mesh for part in parts}
+
+
+def _meshes(drawn: Mapping[str, Shape], names: Iterable[str]) -> dict[str, Mesh]:
+    return {name: indexed_mesh(drawn[name][0], drawn[name][1].astype(np.int32)) for name in names}
 
 
 @dataclass(frozen=True)
@@ -62,7 +77,7 @@ class AssembledBodies:
     def scene(self, names: tuple[str, ...]) -> BodyScene:
         """Some of the bodies, prepared for rays once: most checks trace the same ones."""
         if names not in self._scenes:
-            self._scenes[names] = _scene({name: self.drawn[name] for name in names})
+            self._scenes[names] = body_scene(_meshes(self.drawn, names))
         return self._scenes[names]
 
     def without(self, names: Iterable[str]) -> Bodies:
@@ -106,8 +121,8 @@ class Bodies:
     def count_first(self, origin: Floats, along: Floats, angle: float) -> dict[str, int]:
         """How many rays (N, 3) meet each body first at a base angle, rad; empty for nothing."""
         back = self._back(angle)
-        one, near = self.turning.first(origin @ back, along @ back)
-        two, far = self.still.first(origin, along)
+        one, near = self.turning.first((origin @ back).T, (along @ back).T)
+        two, far = self.still.first(origin.T, along.T)
         other = np.where(two < 0, -1, two + len(self.turning.names))
         names = ("", *self.turning.names, *self.still.names)
         counts = np.bincount(np.where(near < far, one, other) + 1, minlength=len(names))
@@ -117,8 +132,8 @@ class Bodies:
         """(N,) whether something lies between points (N, 3) at a base angle, rad."""
         along, back = unit((ends - starts).T).T, self._back(angle)
         length = np.linalg.norm(ends - starts, axis=1)
-        near = self.turning.first(starts @ back, along @ back)[1]
-        far = self.still.first(starts + LIFT_MM * along, along)[1]
+        near = self.turning.first((starts @ back).T, (along @ back).T)[1]
+        far = self.still.first((starts + LIFT_MM * along).T, along.T)[1]
         return np.asarray(np.minimum(near, far) < length - LIFT_MM)
 
     def _back(self, angle: float) -> Floats:
@@ -140,36 +155,6 @@ def some_angles(context: PrototypeContext) -> Floats:
     return np.asarray(angles[which.astype(np.int64)])
 
 
-def _scene(shapes: Mapping[str, Shape]) -> BodyScene:
-    from embreex.mesh_construction import TriangleMesh
-    from embreex.rtcore_scene import EmbreeScene
-
-    if not shapes:
-        return BodyScene(None, np.zeros(0, dtype=np.int64), ())
-    points, faces = zip(*shapes.values(), strict=True)
-    first = np.cumsum([0, *(len(some) for some in points)])[:-1]
-    scene = EmbreeScene(robust=True)
-    # Not corner by corner: Embree's interface takes every number by itself, most of the time here.
-    TriangleMesh(
-        scene,
-        np.concatenate(points).astype(np.float32),
-        np.concatenate([some + k for some, k in zip(faces, first, strict=True)]).astype(np.int32),
-    )
-    one = np.ones((1, 3), dtype=np.float32)
-    scene.run(one, one)  # the first call commits
-    owner = np.repeat(np.arange(len(shapes)), [len(some) for some in faces])
-    return BodyScene(scene, owner, tuple(shapes))
-
-
-@dataclass(frozen=True)
-class Obstacles:
-    """Bodies that may obstruct the light of the balls."""
-
-    scene: RayScene | None  # all of them; None without any
-    owner: Ints  # (F + 1,) number of each facet's body; -1 at the end, for no facet
-    names: tuple[str, ...]  # of the bodies
-
-
 @dataclass(frozen=True)
 class MeasuredPrototype:
     """The prototype as its files define it, seen from its base at angle zero.
@@ -183,8 +168,8 @@ class MeasuredPrototype:
     body: Floats  # (3, K) centres of the spheres that lie on the pads, mm
     body_radius: Floats  # (K,) mm
     mirrors: PreparedSurfaces  # the reflecting spheres, for rays from the pinhole
-    rotating: Obstacles  # base, caps, and what is fastened to them
-    fixed: Obstacles  # all else
+    rotating: BodyScene  # base, caps, and what is fastened to them
+    fixed: BodyScene  # all else
 
 
 def measure_prototype(
@@ -222,19 +207,6 @@ def measure_prototype(
         body,
         body_radius,
         prepare_for_rays(context.pinhole, surfaces),
-        _obstacles(of_roles(parts, "base", "cap"), drawn, bought & swung),
-        _obstacles(of_roles(parts, "stage", "frame"), drawn, bought - swung),
+        body_scene(placed_meshes(of_roles(parts, *SWUNG)) | _meshes(drawn, sorted(bought & swung))),
+        body_scene(placed_meshes(of_roles(parts, *STILL)) | _meshes(drawn, sorted(bought - swung))),
     )
-
-
-def _obstacles(
-    parts: list[MeasuredPart], drawn: Mapping[str, Shape], bought: set[str]
-) -> Obstacles:
-    meshes = {part.part.name: part.placed_mesh for part in parts}
-    shapes = [(name, *drawn[name]) for name in sorted(bought)]
-    meshes |= {name: indexed_mesh(points, faces.astype(np.int32)) for name, points, faces in shapes}
-    if not meshes:
-        return Obstacles(None, np.full(1, -1), ())
-    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes.values()])
-    scene = build_scene(join_meshes([*meshes.values()]))
-    return Obstacles(scene, np.append(owner, -1), tuple(meshes))

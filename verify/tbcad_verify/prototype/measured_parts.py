@@ -13,7 +13,6 @@ from tbcad_verify.mesh.mesh import (
     Mesh,
     Topology,
     examine_topology,
-    join_meshes,
     mass_properties,
     mesh_from_facets,
 )
@@ -113,16 +112,6 @@ def pose_checks(names: list[CheckName], part: PrintedPart, mesh: Mesh) -> list[C
 def of_roles(parts: list[MeasuredPart], *roles: str) -> list[MeasuredPart]:
     """The parts of some roles."""
     return [part for part in parts if part.part.role in roles]
-
-
-def joined_meshes(parts: list[MeasuredPart]) -> tuple[Mesh, Ints]:
-    """Placed meshes as one, and the part that each facet belongs to.
-
-    Unknown: one could not be measured.
-    """
-    meshes = [part.placed_mesh for part in parts]
-    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
-    return join_meshes(meshes), owner
 
 
 def distance_to_facets(point: Floats, mesh: Mesh, facets: Ints) -> float:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from tbcad_verify.mesh.mesh import join_meshes
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.prototype import record_checks
@@ -36,7 +37,6 @@ from tbcad_verify.prototype.light.ball_views import (
 )
 from tbcad_verify.prototype.measured_parts import (
     MeasuredPart,
-    joined_meshes,
     measure_part,
     of_roles,
 )
@@ -106,7 +106,7 @@ class Findings:
 
     def seats(self) -> list[MeasuredSeat]:
         """Where the pads put the balls."""
-        base, _ = joined_meshes(of_roles(self.parts, "base"))
+        base = join_meshes([part.placed_mesh for part in of_roles(self.parts, "base")])
         return measure_seats(self.context, base)
 
     def caps(self) -> list[MeasuredCap]:
