@@ -18,7 +18,7 @@ from tbcad_verify.mesh.surfaces import Surfaces, prepare_for_rays
 from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype.bodies import BodyScene, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.light.ball_views import ball_coverage, ended_on_balls, outline_coverage
+from tbcad_verify.prototype.light.ball_views import ended_on_balls, outline_coverage
 from tbcad_verify.prototype.light.pinhole_cells import cell_outlines, mirror_spheres
 from tbcad_verify.prototype.light.ray_paths import ray_transfer
 from tbcad_verify.prototype.seats import touching_sphere
@@ -109,9 +109,8 @@ def designed_coverage(context: PrototypeContext) -> np.ndarray:
     apex = balls.columns("px", 3)[:, transfer.ball]
     d = np.einsum("ijm,jms->ims", transfer.on_base, outlines.direction)
     middle = unit(apex - context.pinhole[:, None])
-    return ball_coverage(
-        context, outline_coverage(outlines.is_edge, nearest, d, middle, context.halved)
-    )
+    found = outline_coverage(outlines.is_edge, nearest, d, middle, context.halved)
+    return np.array([found[context.ball == k].min() for k in range(len(balls))])
 
 
 def test_the_designed_machine_covers_what_its_files_do(

@@ -63,7 +63,7 @@ PURE: dict[Any, tuple[str, ...]] = {
     stages.mirrors_found: ("checks",),
     verification: ("area_checks",),
     shell_checks: ("wall", "cells_of_export"),
-    prototype_stages: ("measure_part", "joined_meshes"),
+    prototype_stages: ("measure_part", "join_meshes"),
     bodies_apart: ("overlaps",),
     measured_parts: ("manifold",),
     assembly: ("manifold", "read_solids"),

@@ -48,7 +48,7 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how par
 NOT_MADE = {
     *("inventory", "leds as designed", "assembly step", "plate holes", "drawings"),
     *("fasteners", "fastener holes", "key access", "homing", "controller settings", "klipper"),
-    *("camera mount", "camera gauge", "cap tilt", "shroud", "radius rule"),
+    *("camera mount", "camera gauge", "cap tilt", "plays", "shroud", "radius rule"),
     *("lamps", "light before and after", "light of the lamps", "light from above"),
     *("light in the stage's shadow", "hold ratio", "drive", "motor bearing", "power off"),
     *("fall energy", "object room", "leds seen"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
-from tbcad_verify.mesh.mesh import mass_properties
+from tbcad_verify.mesh.mesh import Mesh, join_meshes, mass_properties
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.mesh.vectors import cross, dot, norm
 from tbcad_verify.prototype import seats, swing
@@ -54,9 +54,13 @@ def parts_of(context: PrototypeContext) -> list[MeasuredPart]:
     return [measure_part(part, parse(read(folder, part.stl))) for part in context.prototype.parts]
 
 
+def base_of(context: PrototypeContext) -> Mesh:
+    return join_meshes([part.placed_mesh for part in of_roles(parts_of(context), "base")])
+
+
 def measured_of(context: PrototypeContext) -> MeasuredPrototype:
     parts = parts_of(context)
-    held = seats.measure_seats(context, joined_meshes(of_roles(parts, "base"))[0])
+    held = seats.measure_seats(context, base_of(context))
     caps = [measure_cap(context, one) for one in of_roles(parts, "cap")]
     return measure_prototype(context, held, caps, parts, assembly_meshes(context))
 
@@ -81,7 +85,7 @@ def test_centres_are_where_the_pads_were_put(measured: MeasuredPrototype) -> Non
 def test_a_moved_pad_moves_the_centre_as_in_closed_form(tmp_path: Path) -> None:
     """The centre moves along the line that both other planes leave it."""
     context = context_of(export(tmp_path / "x", SyntheticPrototype(pads={(1, 2): 0.02})))
-    base, _ = joined_meshes(of_roles(parts_of(context), "base"))
+    base = base_of(context)
     ball = make_balls(SyntheticPrototype())[1]
     shift = np.linalg.solve(ball.normals, [0, 0, -0.02])
     np.testing.assert_allclose(
@@ -95,13 +99,12 @@ def test_balls_touch_pads_in_the_middle(tmp_path: Path, monkeypatch: pytest.Monk
     pad = 1.6
     monkeypatch.setattr(synthetic_prototype, "PAD", pad)
     context = context_of(export(tmp_path / "x", SyntheticPrototype()))
-    base, _ = joined_meshes(of_roles(parts_of(context), "base"))
-    margins = [seat.margin for seat in seats.measure_seats(context, base)]
+    margins = [seat.margin for seat in seats.measure_seats(context, base_of(context))]
     np.testing.assert_allclose(margins, pad / 4, rtol=0.02)
 
 
 def test_pads_are_found_without_the_contacts_being_right(context: PrototypeContext) -> None:
-    base, _ = joined_meshes(of_roles(parts_of(context), "base"))
+    base = base_of(context)
     recorded = context.prototype
     moved = [
         seat.model_copy(update={"contacts": seat.contacts + 0.3 * seat.axis})

@@ -167,6 +167,8 @@ def _led_faults(context: PrototypeContext, crown: TextSolid | None) -> Iterator[
         ]
     if len(pockets) != len(leds):
         yield f"{len(leds)} LEDs, the crown has {len(pockets)} pockets"
+    if [led.position.tolist() for led in leds] != context.export.spec.prototype.stage.leds_mm:
+        yield "the spec has LEDs elsewhere"
     for led in leds:
         distance = [np.abs(led.position - pocket).max() for pocket in pockets]
         if not min(distance, default=np.inf) <= SAME_MM:

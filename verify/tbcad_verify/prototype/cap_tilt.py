@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -30,16 +31,26 @@ def checks(
     which = np.flatnonzero(balls.cap)
     if not which.size:
         return []
-    tilts = []
+    tilts = [
+        math.degrees(math.asin(play / end)) for play, end in spigots(context, carriers, cap_solids)
+    ]
+    return [each_at_most(names[0], balls.names(which), np.array(tilts), TILT_DEG, "deg", "tilts: ")]
+
+
+def spigots(
+    context: PrototypeContext, carriers: list[TextSolid], cap_solids: list[TextSolid]
+) -> Iterator[tuple[float, float]]:
+    """Of each cap the play of its spigot to a side, and the end's distance from its centre, mm.
+
+    Unknown: there is no spigot, or none that goes into a pocket.
+    """
+    which = np.flatnonzero(context.prototype.balls.cap)
     for k, cap in zip(which.tolist(), cap_solids, strict=True):
-        spigots = [*cylinders(context, [cap], k, hollow=False)]
-        if len({round(radius, 6) for radius, *_ in spigots}) != 1:
+        own = [*cylinders(context, [cap], k, hollow=False)]
+        if len({round(radius, 6) for radius, *_ in own}) != 1:
             raise Unknown(f"the cap of ball {k + 1} has no spigot")
-        radius, end = spigots[0][0], max(end for *_, end in spigots)
         sockets = cylinders(context, carriers, k, hollow=True)
-        play = min((socket for socket, *_ in sockets), default=np.nan) - radius
+        play = min((socket for socket, *_ in sockets), default=np.nan) - own[0][0]
         if not play > 0:
             raise Unknown(f"the spigot of ball {k + 1} does not go into a pocket")
-        tilts.append(math.degrees(math.asin(play / end)))
-    ids = balls.names(which)
-    return [each_at_most(names[0], ids, np.array(tilts), TILT_DEG, "deg", "tilts: ")]
+        yield play, max(end for *_, end in own)

@@ -13,8 +13,6 @@ from importlib import import_module
 from inspect import signature
 from typing import Any
 
-import numpy as np
-
 from tbcad_verify.mesh.mesh import join_meshes
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets
@@ -31,7 +29,6 @@ from tbcad_verify.prototype.caps import MeasuredCap, measure_cap
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light.ball_views import (
     BallViews,
-    ball_coverage,
     ball_views,
     pixel_rays,
 )
@@ -40,10 +37,10 @@ from tbcad_verify.prototype.measured_parts import (
     measure_part,
     of_roles,
 )
-from tbcad_verify.prototype.seats import MeasuredSeat, centre_errors, measure_seats
+from tbcad_verify.prototype.seats import MeasuredSeat, measure_seats
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.prototype import Prototype
-from tbcad_verify.report.checks import Check, attempt, check_names, finite, guarded, require
+from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
 from tbcad_verify.report.methods import prototype_stages
 from tbcad_verify.run.results import Results, ResultSink
 from tbcad_verify.step.shell_checks import RULE, rule_check
@@ -51,10 +48,7 @@ from tbcad_verify.step.solids_text import TextSolid
 
 RECORD, PARTS, PRINTING = "prototype's record", "printed parts", "printability of the prototype"
 STAGES = (RECORD, PARTS, *prototype_stages(), PRINTING)
-DIGITS = 9
 ZERO_DISC = "zero_disc"  # of the base, beside its carrier
-
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -65,16 +59,12 @@ class Findings:
     parts: list[MeasuredPart]  # all printed parts
     _known: dict[str, tuple[Any, str]] = field(default_factory=dict, init=False)
 
-    def known(self, name: str) -> tuple[Any, str]:
-        """A finding by its name; None and the reason where it is not known."""
+    def __getitem__(self, name: str) -> Any:
+        """A finding by its name. Unknown: it could not be worked out."""
         if name not in self._known:
             value = getattr(self, name)
             self._known[name] = attempt(value) if callable(value) else (value, "")
-        return self._known[name]
-
-    def __getitem__(self, name: str) -> Any:
-        """A finding by its name. Unknown: it could not be worked out."""
-        return require(*self.known(name))
+        return require(*self._known[name])
 
     def drawn(self) -> dict[str, Shape]:
         """Shapes of the GLB's bodies, by name."""
@@ -151,7 +141,6 @@ def verify_prototype(
         sink(Results(stages=[stage]))
         for module in modules:
             sink(Results(checks=checks_of(module, found)))
-    sink(Results(prototype=json_rows(found)))
     return parts
 
 
@@ -169,46 +158,3 @@ def checks_of(name: str, found: Findings) -> list[Check]:
         return made
 
     return guarded(names, work)
-
-
-def json_rows(found: Findings) -> Row:
-    """Ball by ball and stop by stop, as verify.json has it; what is not known is null."""
-    context, held, views = found.context, found.known("seats")[0], found.known("views")[0]
-    balls = context.prototype.balls
-    count = len(balls)
-    error = minimum = pixels = shell = np.full(count, np.nan)
-    if held is not None:
-        error = centre_errors(context, held)
-    stops = []
-    if views is not None:
-        minimum = ball_coverage(context, views.coverage)
-        pixels = np.round(np.bincount(context.ball, views.pixels, count))
-        shell = np.bincount(context.ball, views.pixels_shell, count)
-        stop = context.prototype.plan.stop[context.plan_rows]
-        stops = [
-            {
-                "stop": number,
-                "base_angle_deg": _rounded(np.degrees(context.angle[stop == number][0])),
-                "mirrors": int((stop == number).sum()),
-                "coverage_mm": _rounded(views.coverage[stop == number].min()),
-                "blocked": int(views.blocked[stop == number].sum()),
-            }
-            for number in np.unique(stop).tolist()
-        ]
-    rows = [
-        {
-            "number": k + 1,
-            "kind": "cap" if balls.cap[k] else "ball",
-            "centre_error_um": _rounded(error[k]),
-            "coverage_mm": _rounded(minimum[k]),
-            "pixels": _rounded(pixels[k]),
-            "pixels_shell": _rounded(shell[k]),
-        }
-        for k in range(count)
-    ]
-    return {"balls": rows, "stops": stops}
-
-
-def _rounded(value: float) -> float | None:
-    known = finite(float(value))
-    return None if known is None else round(known, DIGITS)
