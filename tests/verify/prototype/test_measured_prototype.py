@@ -13,7 +13,7 @@ from OCP.gp import gp_Pnt
 from tbcad_verify.mesh.mesh import Mesh, join_meshes, mass_properties
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.mesh.vectors import cross, dot, norm
-from tbcad_verify.prototype import seats, swing
+from tbcad_verify.prototype import balls_apart, seats, swing
 from tbcad_verify.prototype.assembly import assembly_meshes, part_step_checks
 from tbcad_verify.prototype.bodies import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.caps import measure_cap
@@ -26,6 +26,7 @@ from tbcad_verify.prototype.measured_parts import (
 )
 from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
+from tbcad_verify.report.checks import check_names
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.step.step_file import StepFile, examine_all, load, read_step_files
 
@@ -101,6 +102,17 @@ def test_balls_touch_pads_in_the_middle(tmp_path: Path, monkeypatch: pytest.Monk
     context = context_of(export(tmp_path / "x", SyntheticPrototype()))
     margins = [seat.margin for seat in seats.measure_seats(context, base_of(context))]
     np.testing.assert_allclose(margins, pad / 4, rtol=0.02)
+
+
+@pytest.mark.parametrize(("away", "passes"), [(2.9, False), (3.1, True)])
+def test_balls_keep_the_wall_between_them(
+    measured: MeasuredPrototype, away: float, passes: bool
+) -> None:
+    """Of two balls of 5 mm, one beside the other, and two far away."""
+    body = np.array([[0.0, 0, 0], [10 + away, 0, 0], [99, 0, 0], [0, 99, 0]]).T
+    some = replace(measured, body=body, body_radius=np.full(4, 5.0))
+    (check,) = balls_apart.checks(check_names(balls_apart.CHECKS, "x.stl"), some)
+    assert (check.passed, check.measured) == (passes, pytest.approx(away))
 
 
 def test_pads_are_found_without_the_contacts_being_right(context: PrototypeContext) -> None:
