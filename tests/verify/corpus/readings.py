@@ -202,6 +202,5 @@ def _light_key(
     lamps: Lamps, points: Floats, normals: Floats, some: Bodies | EdgedBodies, angle: float
 ) -> object:
     edges, all_of = (some.grazing, some.bodies) if isinstance(some, EdgedBodies) else (None, some)
-    drawn = all_of.assembly.drawn
-    bodies = [[(name, drawn[name]) for name in names] for names in (all_of.moving, all_of.fixed)]
+    bodies = [(one.scene, one.names) for one in (all_of.turning, all_of.still)]
     return lamps, points, normals, edges, bodies, all_of.context.frame, angle

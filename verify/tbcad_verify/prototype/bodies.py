@@ -72,18 +72,19 @@ class AssembledBodies:
 
     context: PrototypeContext  # the record
     drawn: Mapping[str, Shape]  # their shapes, by name
-    _scenes: dict[tuple[str, ...], BodyScene] = field(default_factory=dict, init=False, repr=False)
-
-    def scene(self, names: tuple[str, ...]) -> BodyScene:
-        """Some of the bodies, prepared for rays once: most checks trace the same ones."""
-        if names not in self._scenes:
-            self._scenes[names] = body_scene(_meshes(self.drawn, names))
-        return self._scenes[names]
+    _scenes: dict[frozenset[str], BodyScene] = field(default_factory=dict, init=False, repr=False)
 
     def without(self, names: Iterable[str]) -> Bodies:
         """All but some that are named."""
         bodies, swung = self.drawn.keys() - VIEWS - set(names), turning(self.context, self.drawn)
-        return Bodies(self, tuple(sorted(bodies & swung)), tuple(sorted(bodies - swung)))
+        return Bodies(self.context, self._scene(bodies & swung), self._scene(bodies - swung))
+
+    def _scene(self, names: set[str]) -> BodyScene:
+        """Some of the bodies, prepared for rays once: most checks trace the same ones."""
+        key = frozenset(names)
+        if key not in self._scenes:
+            self._scenes[key] = body_scene(_meshes(self.drawn, sorted(names)))
+        return self._scenes[key]
 
 
 def turning(context: PrototypeContext, names: Iterable[str]) -> set[str]:
@@ -99,24 +100,9 @@ def turning(context: PrototypeContext, names: Iterable[str]) -> set[str]:
 class Bodies:
     """Bodies that turn with the base, and bodies that do not."""
 
-    assembly: AssembledBodies  # all bodies
-    moving: tuple[str, ...]  # names of those that turn
-    fixed: tuple[str, ...]  # names of the others
-
-    @property
-    def context(self) -> PrototypeContext:
-        """The record."""
-        return self.assembly.context
-
-    @property
-    def turning(self) -> BodyScene:
-        """Those that turn, prepared for rays when the first are traced."""
-        return self.assembly.scene(self.moving)
-
-    @property
-    def still(self) -> BodyScene:
-        """The others."""
-        return self.assembly.scene(self.fixed)
+    context: PrototypeContext  # the record
+    turning: BodyScene
+    still: BodyScene
 
     def count_first(self, origin: Floats, along: Floats, angle: float) -> dict[str, int]:
         """How many rays (N, 3) meet each body first at a base angle, rad; empty for nothing."""
