@@ -267,7 +267,6 @@ REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
     ),
     "many balls": (in_table("balls.csv", lambda rows: rows.extend(rows * 400)), "1604 rows"),
     "ball missing": (in_table("balls.csv", list.pop), "one for each ball"),
-    "ball number": (ball(2, lambda row: row.update(number="7")), "ball 2 must have number 2"),
     "ball kind": (
         ball(2, lambda row: row.update(kind="cube")),
         "line 3: kind is cube, allowed is ball or cap",
@@ -276,9 +275,7 @@ REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
     "part above": (in_record("parts", 0, "stl", to="../carrier.stl"), "plain file name"),
     "mesh twice": (in_record("parts", 0, "stl", to="stage.stl"), "STL of their own"),
     "cap of no ball": (in_record("parts", 1, "ball", to=9), "a cap's ball or null"),
-    "camera": (in_record("camera", to="z"), "camera 'z'"),
     "plan ragged": (lambda f: (f / PLAN).write_text((f / PLAN).read_text() + "1,2\n"), "2 fields"),
-    "stops foreign": (lambda f: (f / "stops.csv").write_text("a,b\n1,2\n"), "no column stop"),
     "program no text": (lambda f: (f / "rotation_plan.nc").write_bytes(b"\xff\xfe"), "UTF-8"),
     "part missing": (lambda f: (f / "stage.stl").unlink(), "stage.stl: missing"),
 }
