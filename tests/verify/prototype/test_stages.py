@@ -35,7 +35,7 @@ ON_STOPS = (
     "rays, balls",
     "pixels, balls",
 )
-ON_BALLS = (*ON_STOPS, "swing", "swing clearance")
+ON_BALLS = (*ON_STOPS, "swing", "swing clearance", "balls apart")
 
 
 def failures(folder: Path) -> dict[str, Check]:

@@ -125,11 +125,6 @@ def _plan_faults(context: PrototypeContext) -> Iterator[str]:
     yield from (f"stop {k} is not in the plan" for k in sorted({*angles} - {*plan.stop.tolist()}))
     columns = (plan.turn, plan.mirror, plan.ball, plan.stop, plan.angle)
     rows = list(zip(*(np.asarray(one).tolist() for one in columns), strict=True))
-    for k, (_, _, ball, stop, angle) in enumerate(rows, 1):
-        if plan.order[k - 1] != k or not 1 <= ball <= len(context.prototype.balls):
-            yield f"row {k} is out of order, or of no ball"
-        if angles.get(stop) != angle:
-            yield f"row {k} is at another angle than its stop"
     shown = {(turn, mirror): tuple(how) for turn, mirror, *how in rows}
     pairs = list(zip(context.mirror_ids, twins(context), strict=True))
     expected = {key for one, two in pairs for key in ((0.0, one), (180.0, two))}
@@ -140,3 +135,8 @@ def _plan_faults(context: PrototypeContext) -> Iterator[str]:
     for one, two in pairs:
         if shown.get((0.0, one)) != shown.get((180.0, two)):
             yield f"{two} by another ball or stop than {one}"
+    for k, (_, _, ball, stop, angle) in enumerate(rows, 1):
+        if plan.order[k - 1] != k or not 1 <= ball <= len(context.prototype.balls):
+            yield f"row {k} is out of order, or of no ball"
+        if angles.get(stop) != angle:
+            yield f"row {k} is at another angle than its stop"
