@@ -14,18 +14,13 @@ from scipy.spatial.transform import Rotation
 from tbcad_verify.as_built.verify import AsBuiltReport, verify_as_built
 from tbcad_verify.cli import main
 from tbcad_verify.errors import BadExport
-from tbcad_verify.mesh.surfaces import Surfaces, prepare_for_rays
-from tbcad_verify.mesh.vectors import unit
-from tbcad_verify.prototype.bodies import MeasuredPrototype, Obstacles
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.light.ball_views import ball_coverage, ended_on_balls, outline_coverage
-from tbcad_verify.prototype.light.pinhole_cells import cell_outlines, mirror_spheres
-from tbcad_verify.prototype.light.ray_paths import ray_transfer
+from tbcad_verify.prototype.light.ball_views import ball_views, pixel_rays
 from tbcad_verify.prototype.seats import touching_sphere
-from tbcad_verify.record.export import read_export
 
 from tests.exported_files import contents
 from tests.verify.prototype.synthetic_prototype import SyntheticPrototype, export
+from tests.verify.prototype.test_measured_prototype import context_of, measured_of
 
 Machine = dict[str, Any]
 Judged = Callable[[], AsBuiltReport]
@@ -38,9 +33,7 @@ def prototype(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def context(prototype: Path) -> PrototypeContext:
-    found = read_export(prototype)
-    assert found.prototype is not None
-    return PrototypeContext(found, found.prototype)
+    return context_of(prototype)
 
 
 @pytest.fixture
@@ -95,23 +88,11 @@ def judged(prototype: Path, calibration: Callable[[], Path]) -> Judged:
     return lambda: verify_as_built(prototype, calibration())
 
 
-def designed_coverage(context: PrototypeContext) -> np.ndarray:
-    """Coverage of each ball as the verification of the files has it, on the record's balls."""
-    balls, none = context.prototype.balls, Obstacles(None, np.full(1, -1), ())
-    centre, normal = balls.columns("cx", 3), unit(balls.columns("nx", 3))
-    radius = balls.radius_mm
-    surfaces = Surfaces(centre + radius * normal, normal, 1 / radius)
-    prepared = prepare_for_rays(context.pinhole, surfaces)
-    transfer = ray_transfer(
-        MeasuredPrototype(context, centre, radius, centre, radius, prepared, none, none)
-    )
-    outlines, nearest = ended_on_balls(transfer, cell_outlines(mirror_spheres(context)))
-    apex = balls.columns("px", 3)[:, transfer.ball]
-    d = np.einsum("ijm,jms->ims", transfer.on_base, outlines.direction)
-    middle = unit(apex - context.pinhole[:, None])
-    return ball_coverage(
-        context, outline_coverage(outlines.is_edge, nearest, d, middle, context.halved)
-    )
+def designed_coverage(context: PrototypeContext) -> list[float]:
+    """Coverage of each ball as the verification of the files has it, on the balls as measured."""
+    measured = measured_of(context)
+    found = ball_views(measured, pixel_rays(measured)).coverage
+    return [found[context.ball == k].min() for k in range(len(context.prototype.balls))]
 
 
 def test_the_designed_machine_covers_what_its_files_do(
@@ -120,7 +101,7 @@ def test_the_designed_machine_covers_what_its_files_do(
     report = judged()
     assert report.passed
     found = [row.coverage_mm for row in report.balls]
-    assert found == pytest.approx(designed_coverage(context).tolist(), rel=1e-3)
+    assert found == pytest.approx(designed_coverage(context), rel=1e-3)
     assert len(report.coverage_mm) == len(context.export.mirrors)
     assert [row.mirrors for row in report.balls] == (
         2 * np.bincount(context.ball, minlength=len(report.balls))

@@ -310,6 +310,10 @@ FAILING: Broken = {
     ("leds as designed", RECORD): {
         "an LED elsewhere": (at("leds/0/position_mm/0", plus(2.0)), "no pocket"),
         "an LED less": (at("leds/-1"), "4 pockets"),
+        "LEDs that the spec has not": (
+            at(f"{SPEC}stage/leds_mm", [[0.0, 0.0, -8.0]], DESIGN),
+            "the spec has LEDs elsewhere",
+        ),
     },
     ("leds seen", RECORD): {"LEDs on one side": (at("leds", one_side), "past an object")},
     ("object room", DESIGN): {
@@ -317,6 +321,15 @@ FAILING: Broken = {
             at(f"{SPEC}stage/top_mm", -21.0, DESIGN),
             "stage_disc",
         ),
+    },
+    ("plays", DESIGN): {
+        f"another {key}": (at(f"{SPEC}{key}", to, DESIGN), words)
+        for key, to, words in (
+            ("base/clearance_mm", 0.6, "the cup of ball 1 is 0.500 mm from it"),
+            ("base/cap_play_mm", 0.2, "a spigot has 0.100 mm of play"),
+            ("frame/bearing_fit_mm", 0.0, "no hole for bearing_front"),
+            ("frame/post_play_mm", 0.4, "no hole for stage_post"),
+        )
     },
     ("ball centres", DESIGN): {
         "pads that are moved otherwise": (at(f"{SPEC}base/pad_offset_mm", 0.1, DESIGN), "um"),

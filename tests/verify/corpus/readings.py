@@ -21,13 +21,13 @@ from tbcad_verify.mesh.rays import RayScene
 from tbcad_verify.prototype import (
     assembly,
     bodies,
-    camera_gauge_checks,
+    bodies_apart,
     caps,
     cut_checks,
     fastener_checks,
     measured_parts,
     seats,
-    stage_checks,
+    swing,
 )
 from tbcad_verify.prototype import stages as prototype_stages
 from tbcad_verify.prototype.bodies import Bodies, MeasuredPrototype
@@ -63,12 +63,11 @@ PURE: dict[Any, tuple[str, ...]] = {
     stages.mirrors_found: ("checks",),
     verification: ("area_checks",),
     shell_checks: ("wall", "cells_of_export"),
-    prototype_stages: ("measure_part", "joined_meshes"),
-    prototype_stages.bodies_apart: ("overlaps",),
+    prototype_stages: ("measure_part", "join_meshes"),
+    bodies_apart: ("overlaps",),
     measured_parts: ("manifold",),
     assembly: ("manifold", "read_solids"),
-    bodies: ("_scene", "join_meshes", "build_scene"),
-    camera_gauge_checks: ("joined_meshes", "build_scene"),
+    bodies: ("indexed_mesh", "join_meshes", "build_scene"),
     caps: ("fit_sphere",),
     cut_checks: ("read_dxf",),
     fastener_checks: ("_hole_spans",),
@@ -76,7 +75,6 @@ PURE: dict[Any, tuple[str, ...]] = {
     homing_checks: ("run_program",),
     klipper_checks: ("run_klipper",),
     seats: ("_facets_near", "_pad", "distance_to_facets"),
-    stage_checks: ("joined_meshes", "build_scene"),
 }
 
 
@@ -89,11 +87,11 @@ def remembered() -> Iterator[None]:
     keyed: tuple[tuple[Any, str, Callable[..., object]], ...] = (
         (stages, "read_facets", _file_key),
         (stages, "read_3mf", _file_key),
-        (assembly, "assembly_meshes", _drawn_key),
-        (prototype_stages.ball_views, "ball_views", _traced_key),
-        (prototype_stages.swing, "axial_solid", _solid_key),
-        (prototype_stages.swing, "sweep", _sweep_key),
-        (prototype_stages.ball_views, "pixel_rays", _rays_key),
+        (prototype_stages, "assembly_meshes", _drawn_key),
+        (prototype_stages, "ball_views", _traced_key),
+        (swing, "axial_solid", _solid_key),
+        (swing, "sweep", _sweep_key),
+        (prototype_stages, "pixel_rays", _rays_key),
         (lamp_light, "irradiance", _light_key),
         *((module, name, _given) for module, names in PURE.items() for name in names),
     )
@@ -204,6 +202,5 @@ def _light_key(
     lamps: Lamps, points: Floats, normals: Floats, some: Bodies | EdgedBodies, angle: float
 ) -> object:
     edges, all_of = (some.grazing, some.bodies) if isinstance(some, EdgedBodies) else (None, some)
-    drawn = all_of.assembly.drawn
-    bodies = [[(name, drawn[name]) for name in names] for names in (all_of.moving, all_of.fixed)]
+    bodies = [(one.scene, one.names) for one in (all_of.turning, all_of.still)]
     return lamps, points, normals, edges, bodies, all_of.context.frame, angle

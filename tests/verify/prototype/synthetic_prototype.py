@@ -48,7 +48,7 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # how par
 NOT_MADE = {
     *("inventory", "leds as designed", "assembly step", "plate holes", "drawings"),
     *("fasteners", "fastener holes", "key access", "homing", "controller settings", "klipper"),
-    *("camera mount", "camera gauge", "cap tilt", "shroud", "radius rule"),
+    *("camera mount", "camera gauge", "cap tilt", "plays", "shroud", "radius rule"),
     *("lamps", "light before and after", "light of the lamps", "light from above"),
     *("light in the stage's shadow", "hold ratio", "drive", "motor bearing", "power off"),
     *("fall energy", "object room", "leds seen"),
@@ -277,7 +277,7 @@ def ball_rows(balls: list[Ball]) -> list[dict[str, Any]]:
         row |= {"polar_deg": polar, "azimuth_deg": azimuth}
         for name, v in {"p": ball.p, "n": ball.n, "c": ball.c, "b": ball.b}.items():
             row |= {name + axis: x for axis, x in zip("xyz", (v + 0.0).tolist(), strict=True)}
-        out.append(row | {"coverage_mm": 30.0, "coverage_fixed_mm": 0.0})
+        out.append(row)
     return out
 
 
@@ -332,9 +332,6 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
     found = {
         "schema": "tbcad-prototype/2",
         "camera": "a",
-        "target_mm": spec.target,
-        "picture": "moved" if spec.moved else "fixed",
-        "frame": dict(zip(("axis", "zero", "third"), frame().tolist(), strict=True)),
         "swing_deg": [switch_angle(stops), stops[-1][1]],
         "balls": "balls.csv",
         "seats": [
@@ -348,7 +345,7 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
             for k, ball in enumerate(balls)
         ],
         "parts": entries,
-        "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0], "direction": [0, 0, 1]}],
+        "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0]}],
         "home": {
             "switch_deg": switch_angle(stops),
             "homed_deg": switch_angle(stops) + 2,

@@ -128,4 +128,4 @@ def test_a_build_with_another_drive_is_verified(drive: str, lock: str, tmp_path:
     assert run(words) == 0
     report = verify(folder)
     assert report.passed, report.verdict
-    assert report.prototype
+    assert report.balls

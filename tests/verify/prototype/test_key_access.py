@@ -45,7 +45,7 @@ def unreached(
     one = screw(**changed)
     steps = steps or {"one": ("plate", one.name, *bodies)}
     record = SimpleNamespace(
-        assembly_steps=[AssemblyStep(key=key, mounts=list(some)) for key, some in steps.items()],
+        assembly_steps=[AssemblyStep(mounts=list(some)) for some in steps.values()],
         fasteners=[one, *others],
         parts=[],
         bought=[SimpleNamespace(name=name, turns=True) for name in turning],

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
-from tbcad_verify.mesh.mesh import mass_properties
+from tbcad_verify.mesh.mesh import Mesh, join_meshes, mass_properties
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.mesh.vectors import cross, dot, norm
-from tbcad_verify.prototype import seats, swing
+from tbcad_verify.prototype import balls_apart, seats, swing
 from tbcad_verify.prototype.assembly import assembly_meshes, part_step_checks
 from tbcad_verify.prototype.bodies import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.caps import measure_cap
@@ -21,12 +21,12 @@ from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light import ball_views, pinhole_cells, ray_paths
 from tbcad_verify.prototype.measured_parts import (
     MeasuredPart,
-    joined_meshes,
     measure_part,
     of_roles,
 )
 from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
+from tbcad_verify.report.checks import check_names
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.step.step_file import StepFile, examine_all, load, read_step_files
 
@@ -55,9 +55,13 @@ def parts_of(context: PrototypeContext) -> list[MeasuredPart]:
     return [measure_part(part, parse(read(folder, part.stl))) for part in context.prototype.parts]
 
 
+def base_of(context: PrototypeContext) -> Mesh:
+    return join_meshes([part.placed_mesh for part in of_roles(parts_of(context), "base")])
+
+
 def measured_of(context: PrototypeContext) -> MeasuredPrototype:
     parts = parts_of(context)
-    held = seats.measure_seats(context, joined_meshes(of_roles(parts, "base"))[0])
+    held = seats.measure_seats(context, base_of(context))
     caps = [measure_cap(context, one) for one in of_roles(parts, "cap")]
     return measure_prototype(context, held, caps, parts, assembly_meshes(context))
 
@@ -82,7 +86,7 @@ def test_centres_are_where_the_pads_were_put(measured: MeasuredPrototype) -> Non
 def test_a_moved_pad_moves_the_centre_as_in_closed_form(tmp_path: Path) -> None:
     """The centre moves along the line that both other planes leave it."""
     context = context_of(export(tmp_path / "x", SyntheticPrototype(pads={(1, 2): 0.02})))
-    base, _ = joined_meshes(of_roles(parts_of(context), "base"))
+    base = base_of(context)
     ball = make_balls(SyntheticPrototype())[1]
     shift = np.linalg.solve(ball.normals, [0, 0, -0.02])
     np.testing.assert_allclose(
@@ -96,13 +100,23 @@ def test_balls_touch_pads_in_the_middle(tmp_path: Path, monkeypatch: pytest.Monk
     pad = 1.6
     monkeypatch.setattr(synthetic_prototype, "PAD", pad)
     context = context_of(export(tmp_path / "x", SyntheticPrototype()))
-    base, _ = joined_meshes(of_roles(parts_of(context), "base"))
-    margins = [seat.margin for seat in seats.measure_seats(context, base)]
+    margins = [seat.margin for seat in seats.measure_seats(context, base_of(context))]
     np.testing.assert_allclose(margins, pad / 4, rtol=0.02)
 
 
+@pytest.mark.parametrize(("away", "passes"), [(2.9, False), (3.1, True)])
+def test_balls_keep_the_wall_between_them(
+    measured: MeasuredPrototype, away: float, passes: bool
+) -> None:
+    """Of two balls of 5 mm, one beside the other, and two far away."""
+    body = np.array([[0.0, 0, 0], [10 + away, 0, 0], [99, 0, 0], [0, 99, 0]]).T
+    some = replace(measured, body=body, body_radius=np.full(4, 5.0))
+    (check,) = balls_apart.checks(check_names(balls_apart.CHECKS, "x.stl"), some)
+    assert (check.passed, check.measured) == (passes, pytest.approx(away))
+
+
 def test_pads_are_found_without_the_contacts_being_right(context: PrototypeContext) -> None:
-    base, _ = joined_meshes(of_roles(parts_of(context), "base"))
+    base = base_of(context)
     recorded = context.prototype
     moved = [
         seat.model_copy(update={"contacts": seat.contacts + 0.3 * seat.axis})

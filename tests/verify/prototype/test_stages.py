@@ -31,12 +31,11 @@ Row = dict[str, Any]
 ON_STOPS = (
     "cells",
     "coverage, balls",
-    "coverage, balls, deviation from record",
     "light paths, balls",
     "rays, balls",
     "pixels, balls",
 )
-ON_BALLS = (*ON_STOPS, "swing", "swing clearance")
+ON_BALLS = (*ON_STOPS, "swing", "swing clearance", "balls apart")
 
 
 def failures(folder: Path) -> dict[str, Check]:
@@ -71,12 +70,6 @@ def test_a_good_prototype_passes(prototype_folder: Path) -> None:
     assert report.verdict.startswith(
         "PASS: as designed, every mirror sees 25 mm or more on 4 balls"
     )
-    section = json.loads((prototype_folder / "verify.json").read_text())["prototype"]
-    assert [ball["kind"] for ball in section["balls"]] == ["ball", "ball", "ball", "cap"]
-    assert max(ball["centre_error_um"] for ball in section["balls"]) < 0.01
-    assert sum(stop["mirrors"] for stop in section["stops"]) == 49
-    assert {stop["blocked"] for stop in section["stops"]} == {0}
-    assert all(stop["coverage_mm"] > 25 for stop in section["stops"])
     names = {check.name for check in report.checks}
     assert "poses" in names
     assert not names & {"coverage, spheres", "light paths", "mirrors found"}
@@ -143,12 +136,12 @@ RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
     "without weight": (ball(1, lambda r: r.update(mass_g="0.001")), ("ball sizes",), "ball 1"),
     "mirror missing in the plan": (
         in_table(PLAN, row_of("a0007")),
-        ("plan mirrors", "plan twins", *ON_STOPS),
-        "no a0007",
+        ("plan", *ON_STOPS),
+        "a0007",
     ),
-    "twin missing": (in_table(PLAN, row_of("b0007")), ("plan mirrors", "plan twins"), "b0007"),
-    "twins exchanged": (in_table(PLAN, exchanged), ("plan twins",), "b0007"),
-    "angle off": (in_table(PLAN, nudged(ANGLE, 1e-3)), ("plan stops", "plan twins"), "row 4"),
+    "twin missing": (in_table(PLAN, row_of("b0007")), ("plan",), "b0007"),
+    "twins exchanged": (in_table(PLAN, exchanged), ("plan",), "b0007"),
+    "angle off": (in_table(PLAN, nudged(ANGLE, 1e-3)), ("plan",), "row 4"),
     "stops and plan agree on a wrong angle": (
         lambda folder: table(table(folder, "stops.csv", stop_nudged), PLAN, stop_nudged),
         ("plan program",),
@@ -156,7 +149,7 @@ RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
     ),
     "a stop beyond the swing": (
         in_record("swing_deg", to=lambda swing: [swing[0], swing[1] - 1e-6]),
-        ("plan stops", "plan program"),
+        ("plan", "plan program"),
         "beyond the swing",
     ),
     "pose mirrored": (
@@ -274,7 +267,6 @@ REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
     ),
     "many balls": (in_table("balls.csv", lambda rows: rows.extend(rows * 400)), "1604 rows"),
     "ball missing": (in_table("balls.csv", list.pop), "one for each ball"),
-    "ball number": (ball(2, lambda row: row.update(number="7")), "ball 2 must have number 2"),
     "ball kind": (
         ball(2, lambda row: row.update(kind="cube")),
         "line 3: kind is cube, allowed is ball or cap",
@@ -283,9 +275,7 @@ REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
     "part above": (in_record("parts", 0, "stl", to="../carrier.stl"), "plain file name"),
     "mesh twice": (in_record("parts", 0, "stl", to="stage.stl"), "STL of their own"),
     "cap of no ball": (in_record("parts", 1, "ball", to=9), "a cap's ball or null"),
-    "camera": (in_record("camera", to="z"), "camera 'z'"),
     "plan ragged": (lambda f: (f / PLAN).write_text((f / PLAN).read_text() + "1,2\n"), "2 fields"),
-    "stops foreign": (lambda f: (f / "stops.csv").write_text("a,b\n1,2\n"), "no column stop"),
     "program no text": (lambda f: (f / "rotation_plan.nc").write_bytes(b"\xff\xfe"), "UTF-8"),
     "part missing": (lambda f: (f / "stage.stl").unlink(), "stage.stl: missing"),
 }

@@ -42,7 +42,8 @@ def test_radii_are_by_their_rule_only(export: Export) -> None:
 def test_margin_and_largest_radius_belong_to_the_rule(export: Export) -> None:
     rule = export.spec.mirrors.radius_rule
     assert rule_check(with_spec(export, margin_mm=0.7)).passed == (rule != "traced")
-    assert rule_check(with_spec(export, max_radius_widths=31.0)).passed == (rule == "flat")
+    for widths in (31.0, 29.0, 12.0):
+        assert rule_check(with_spec(export, max_radius_widths=widths)).passed == (rule == "flat")
 
 
 @pytest.mark.parametrize("key", ["radius_mm", "coverage_mm"])

@@ -41,7 +41,7 @@ def long_report(shell_report: Report) -> Report:
     return replace(
         shell_report,
         checks=shell_report.checks + more,
-        prototype={"balls": [{}] * 16, "stops": []},
+        balls=16,
         seconds=1234.5,
         as_made=AsMade(50, tuple(ProcessYield(*one) for one in YIELDS)),
         note="No prototype: " + "it reaches into the light, and there is no place for it; " * 3,

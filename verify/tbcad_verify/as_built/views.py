@@ -91,7 +91,7 @@ def half_views(
     ball = machine.placed(centre[:, half.ball[known]], half.frame[known])
     radius, pinhole = machine.radius[half.ball[known]], machine.camera.pinhole
     apex = highlights(pinhole, ball, radius, np.zeros(3))
-    start = shell.apex if context.prototype.moved else half.designed[:, known]
+    start = shell.apex if context.moved else half.designed[:, known]
     before, after = _sight(start, shell.pinhole), _sight(apex, pinhole)
     matrix = np.einsum("rim,rjm->ijm", after, before)
     normal = unit(apex - ball)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
-import math
-import re
 import sys
 from pathlib import Path
 
 from tbcad_verify.programs.program_query import (
-    NO_ANSWER,
     SCRIPT_END,
     SOLID,
     SPHERES,
@@ -20,11 +17,9 @@ from tbcad_verify.programs.program_query import (
     Sandbox,
     on_path,
     script_figures,
-    skipped,
     solid_checks,
-    text_of,
 )
-from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most
+from tbcad_verify.report.checks import Check, CheckName, at_most
 
 INSTALL = "pip install gmsh"
 GMSH_KEYS = ("solids", "spheres", "volume")
@@ -52,17 +47,6 @@ def look():
 message = str
 """
 
-GEO = """
-SetFactory("OpenCASCADE");
-shapes() = ShapeFromFile("given.step");
-volumes() = Volume{:};
-total = 0;
-For k In {0 : #volumes() - 1}
-  mass() = Mass Volume{volumes(k)};
-  total = total + mass(0);
-EndFor
-Printf("solids %g volume %.17g", #volumes(), total);
-"""
 FREECAD_KEYS = ("solids", "invalid", "open", "loose", "spheres", "volume")
 
 # FreeCAD runs this inside itself and ends with 0 even when it breaks, unless it says otherwise.
@@ -90,43 +74,21 @@ def message(error):
 
 
 def find_gmsh() -> Command:
-    """Python with the package's file, or the program."""
+    """Python with the package's file; the program alone does not tell what faces are."""
     spec = importlib.util.find_spec("gmsh") if sys.executable else None
-    if spec is not None and spec.origin and Path(spec.origin).is_file():
-        return (
-            sys.executable,
-            "-I",
-            "-c",
-            GMSH_SCRIPT + SCRIPT_END,
-            str(Path(spec.origin).absolute()),
-        )
-    return on_path("gmsh")
+    if spec is None or not spec.origin or not Path(spec.origin).is_file():
+        return ()
+    script = GMSH_SCRIPT + SCRIPT_END
+    return sys.executable, "-I", "-c", script, str(Path(spec.origin).absolute())
 
 
 def ask_gmsh(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
     """One solid with the mirrors' faces and the mesh's volume.
 
-    Unknown: the program gives no answer.
+    Unknown: the package gives no answer.
     """
-    is_package = len(sandbox.command) > 1
-    if is_package:
-        figures = script_figures(sandbox.run(), sandbox.folder, GMSH_KEYS)
-    else:
-        figures = _program(sandbox)
-    solids, spheres, volume = solid_checks(names, figures, expected)
-    if not is_package:
-        spheres = skipped(names[1], f"only its package counts them: {INSTALL}")
-    return [solids, spheres, volume]
-
-
-def _program(sandbox: Sandbox) -> dict[str, float]:
-    script = sandbox.folder / "look.geo"
-    script.write_text(GEO, encoding="utf-8")
-    text = text_of(sandbox.run(script, "-parse_and_exit"))
-    match = re.search(r"solids (\d{1,9}) volume ([-+.e\d]{1,30})\s", text)
-    if match is None:
-        raise Unknown(NO_ANSWER)
-    return {"solids": float(match[1]), "spheres": math.nan, "volume": float(match[2])}
+    figures = script_figures(sandbox.run(), sandbox.folder, GMSH_KEYS)
+    return list(solid_checks(names, figures, expected))
 
 
 GMSH = ProgramQuery(

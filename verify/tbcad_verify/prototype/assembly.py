@@ -19,6 +19,7 @@ from tbcad_verify.prototype.glb import read_glb
 from tbcad_verify.prototype.measured_parts import MeasuredPart, manifold
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
+from tbcad_verify.record.prototype import RECORD
 from tbcad_verify.record.prototype_sections import PrintedPart
 from tbcad_verify.report.checks import (
     Check,
@@ -36,6 +37,7 @@ from tbcad_verify.types import Floats, Ints
 
 Shape = tuple[Floats, Ints]  # corners (V, 3) in mm, facets (F, 3)
 
+FILE = RECORD
 CHECKS = {"inventory": "faults", "leds as designed": "faults", "assembly step": "mm"}
 TURNING = frozenset({"wheel", "shaft", "collar", "coupling", "rotary_stage_top"})
 VIEWS = frozenset({"capture_sphere", "camera_view"})
@@ -165,6 +167,8 @@ def _led_faults(context: PrototypeContext, crown: TextSolid | None) -> Iterator[
         ]
     if len(pockets) != len(leds):
         yield f"{len(leds)} LEDs, the crown has {len(pockets)} pockets"
+    if [led.position.tolist() for led in leds] != context.export.spec.prototype.stage.leds_mm:
+        yield "the spec has LEDs elsewhere"
     for led in leds:
         distance = [np.abs(led.position - pocket).max() for pocket in pockets]
         if not min(distance, default=np.inf) <= SAME_MM:

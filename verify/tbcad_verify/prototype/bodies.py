@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tbcad_verify.mesh.mesh import indexed_mesh, join_meshes
-from tbcad_verify.mesh.rays import RayScene, build_scene
+from tbcad_verify.mesh.mesh import Mesh, indexed_mesh, join_meshes
+from tbcad_verify.mesh.rays import RayScene, build_scene, distances_to_planes, first_hits
 from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype.assembly import VIEWS, Shape
@@ -24,7 +24,7 @@ from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Bools, Floats, Ints
 
 OWN = ("camera",)  # body that its own rays start in
-SWUNG = ("base", "cap")  # roles of printed parts that turn with the base
+SWUNG, STILL = ("base", "cap"), ("stage", "frame")  # roles of parts that turn with the base or not
 LEAST_ANGLES = 7
 LIFT_MM = 1e-3
 
@@ -33,22 +33,37 @@ LIFT_MM = 1e-3
 class BodyScene:
     """Bodies that rays meet."""
 
-    embree: object  # the committed scene; None without any body
-    owner: Ints  # (F,) number of each facet's body
+    scene: RayScene | None  # all of them; None without any
+    owner: Ints  # (F + 1,) number of each facet's body; -1 at the end, for no facet
     names: tuple[str, ...]  # of the bodies
 
     def first(self, origin: Floats, along: Floats) -> tuple[Ints, Floats]:
-        """Number of the body that rays (N, 3) meet first, -1 for none, and its distance, mm."""
-        body = np.full(len(origin), -1, dtype=np.int64)
-        distance = np.full(len(origin), np.inf)
-        if self.embree is not None and len(origin):
-            found = self.embree.run(  # type: ignore[attr-defined]
-                origin.astype(np.float32), along.astype(np.float32), output=1
-            )
-            hit = found["primID"] >= 0
-            body[hit] = self.owner[found["primID"][hit]]
-            distance[hit] = found["tfar"][hit]
-        return body, distance
+        """Number of the body that rays (3, N) meet first, -1 for none, and its distance, mm."""
+        distance = np.full(along.shape[1], np.inf)
+        if self.scene is None:
+            return np.full(distance.size, -1), distance
+        facet = first_hits(self.scene, origin, along)
+        hit = np.flatnonzero(facet >= 0)
+        distance[hit] = distances_to_planes(self.scene, facet[hit], origin[:, hit], along[:, hit])
+        return self.owner[facet], distance
+
+
+def body_scene(meshes: Mapping[str, Mesh]) -> BodyScene:
+    """Bodies by name, prepared for rays."""
+    if not meshes:
+        return BodyScene(None, np.full(1, -1), ())
+    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes.values()])
+    scene = build_scene(join_meshes([*meshes.values()]))
+    return BodyScene(scene, np.append(owner, -1), tuple(meshes))
+
+
+def placed_meshes(parts: list[MeasuredPart]) -> dict[str, Mesh]:
+    """Meshes of parts in their places, by name. Unknown: one could not be measured."""
+    return {part.part.name: part.placed_mesh for part in parts}
+
+
+def _meshes(drawn: Mapping[str, Shape], names: Iterable[str]) -> dict[str, Mesh]:
+    return {name: indexed_mesh(drawn[name][0], drawn[name][1].astype(np.int32)) for name in names}
 
 
 @dataclass(frozen=True)
@@ -57,18 +72,19 @@ class AssembledBodies:
 
     context: PrototypeContext  # the record
     drawn: Mapping[str, Shape]  # their shapes, by name
-    _scenes: dict[tuple[str, ...], BodyScene] = field(default_factory=dict, init=False, repr=False)
-
-    def scene(self, names: tuple[str, ...]) -> BodyScene:
-        """Some of the bodies, prepared for rays once: most checks trace the same ones."""
-        if names not in self._scenes:
-            self._scenes[names] = _scene({name: self.drawn[name] for name in names})
-        return self._scenes[names]
+    _scenes: dict[frozenset[str], BodyScene] = field(default_factory=dict, init=False, repr=False)
 
     def without(self, names: Iterable[str]) -> Bodies:
         """All but some that are named."""
         bodies, swung = self.drawn.keys() - VIEWS - set(names), turning(self.context, self.drawn)
-        return Bodies(self, tuple(sorted(bodies & swung)), tuple(sorted(bodies - swung)))
+        return Bodies(self.context, self._scene(bodies & swung), self._scene(bodies - swung))
+
+    def _scene(self, names: set[str]) -> BodyScene:
+        """Some of the bodies, prepared for rays once: most checks trace the same ones."""
+        key = frozenset(names)
+        if key not in self._scenes:
+            self._scenes[key] = body_scene(_meshes(self.drawn, sorted(names)))
+        return self._scenes[key]
 
 
 def turning(context: PrototypeContext, names: Iterable[str]) -> set[str]:
@@ -84,30 +100,15 @@ def turning(context: PrototypeContext, names: Iterable[str]) -> set[str]:
 class Bodies:
     """Bodies that turn with the base, and bodies that do not."""
 
-    assembly: AssembledBodies  # all bodies
-    moving: tuple[str, ...]  # names of those that turn
-    fixed: tuple[str, ...]  # names of the others
-
-    @property
-    def context(self) -> PrototypeContext:
-        """The record."""
-        return self.assembly.context
-
-    @property
-    def turning(self) -> BodyScene:
-        """Those that turn, prepared for rays when the first are traced."""
-        return self.assembly.scene(self.moving)
-
-    @property
-    def still(self) -> BodyScene:
-        """The others."""
-        return self.assembly.scene(self.fixed)
+    context: PrototypeContext  # the record
+    turning: BodyScene
+    still: BodyScene
 
     def count_first(self, origin: Floats, along: Floats, angle: float) -> dict[str, int]:
         """How many rays (N, 3) meet each body first at a base angle, rad; empty for nothing."""
         back = self._back(angle)
-        one, near = self.turning.first(origin @ back, along @ back)
-        two, far = self.still.first(origin, along)
+        one, near = self.turning.first((origin @ back).T, (along @ back).T)
+        two, far = self.still.first(origin.T, along.T)
         other = np.where(two < 0, -1, two + len(self.turning.names))
         names = ("", *self.turning.names, *self.still.names)
         counts = np.bincount(np.where(near < far, one, other) + 1, minlength=len(names))
@@ -117,8 +118,8 @@ class Bodies:
         """(N,) whether something lies between points (N, 3) at a base angle, rad."""
         along, back = unit((ends - starts).T).T, self._back(angle)
         length = np.linalg.norm(ends - starts, axis=1)
-        near = self.turning.first(starts @ back, along @ back)[1]
-        far = self.still.first(starts + LIFT_MM * along, along)[1]
+        near = self.turning.first((starts @ back).T, (along @ back).T)[1]
+        far = self.still.first((starts + LIFT_MM * along).T, along.T)[1]
         return np.asarray(np.minimum(near, far) < length - LIFT_MM)
 
     def _back(self, angle: float) -> Floats:
@@ -140,36 +141,6 @@ def some_angles(context: PrototypeContext) -> Floats:
     return np.asarray(angles[which.astype(np.int64)])
 
 
-def _scene(shapes: Mapping[str, Shape]) -> BodyScene:
-    from embreex.mesh_construction import TriangleMesh
-    from embreex.rtcore_scene import EmbreeScene
-
-    if not shapes:
-        return BodyScene(None, np.zeros(0, dtype=np.int64), ())
-    points, faces = zip(*shapes.values(), strict=True)
-    first = np.cumsum([0, *(len(some) for some in points)])[:-1]
-    scene = EmbreeScene(robust=True)
-    # Not corner by corner: Embree's interface takes every number by itself, most of the time here.
-    TriangleMesh(
-        scene,
-        np.concatenate(points).astype(np.float32),
-        np.concatenate([some + k for some, k in zip(faces, first, strict=True)]).astype(np.int32),
-    )
-    one = np.ones((1, 3), dtype=np.float32)
-    scene.run(one, one)  # the first call commits
-    owner = np.repeat(np.arange(len(shapes)), [len(some) for some in faces])
-    return BodyScene(scene, owner, tuple(shapes))
-
-
-@dataclass(frozen=True)
-class Obstacles:
-    """Bodies that may obstruct the light of the balls."""
-
-    scene: RayScene | None  # all of them; None without any
-    owner: Ints  # (F + 1,) number of each facet's body; -1 at the end, for no facet
-    names: tuple[str, ...]  # of the bodies
-
-
 @dataclass(frozen=True)
 class MeasuredPrototype:
     """The prototype as its files define it, seen from its base at angle zero.
@@ -183,8 +154,8 @@ class MeasuredPrototype:
     body: Floats  # (3, K) centres of the spheres that lie on the pads, mm
     body_radius: Floats  # (K,) mm
     mirrors: PreparedSurfaces  # the reflecting spheres, for rays from the pinhole
-    rotating: Obstacles  # base, caps, and what is fastened to them
-    fixed: Obstacles  # all else
+    rotating: BodyScene  # base, caps, and what is fastened to them
+    fixed: BodyScene  # all else
 
 
 def measure_prototype(
@@ -222,19 +193,6 @@ def measure_prototype(
         body,
         body_radius,
         prepare_for_rays(context.pinhole, surfaces),
-        _obstacles(of_roles(parts, "base", "cap"), drawn, bought & swung),
-        _obstacles(of_roles(parts, "stage", "frame"), drawn, bought - swung),
+        body_scene(placed_meshes(of_roles(parts, *SWUNG)) | _meshes(drawn, sorted(bought & swung))),
+        body_scene(placed_meshes(of_roles(parts, *STILL)) | _meshes(drawn, sorted(bought - swung))),
     )
-
-
-def _obstacles(
-    parts: list[MeasuredPart], drawn: Mapping[str, Shape], bought: set[str]
-) -> Obstacles:
-    meshes = {part.part.name: part.placed_mesh for part in parts}
-    shapes = [(name, *drawn[name]) for name in sorted(bought)]
-    meshes |= {name: indexed_mesh(points, faces.astype(np.int32)) for name, points, faces in shapes}
-    if not meshes:
-        return Obstacles(None, np.full(1, -1), ())
-    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes.values()])
-    scene = build_scene(join_meshes([*meshes.values()]))
-    return Obstacles(scene, np.append(owner, -1), tuple(meshes))

@@ -15,10 +15,13 @@ import numpy as np
 from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.fastener_checks import MOTOR_DEPTH_MM
+from tbcad_verify.record.prototype import GLB
+from tbcad_verify.record.prototype_sections import PlacedFastener
 from tbcad_verify.record.spec import BaseSpec
 from tbcad_verify.report.checks import Check, CheckName, at_most, informative, short_list
 from tbcad_verify.types import Floats
 
+FILE = GLB
 CHECKS = {"bodies apart": "mm", "meant fits": "pairs"}
 # Mean thickness of what chords cut from round faces in contact: two thirds of the 0.1 mm by which
 # facets of the GLB leave them. On flat faces nothing is cut; a clash of less harms no print.
@@ -40,16 +43,18 @@ FITS: tuple[tuple[str, str, Callable[[BaseSpec], float]], ...] = (
 def checks(
     names: list[CheckName],
     context: PrototypeContext,
-    solids: Mapping[str, Any],
+    closed: Mapping[str, Any],
     drawn: Mapping[str, Shape],
 ) -> list[Check]:
     """All bodies against all; meant fits are listed with their depth."""
     with_belt = drawn.keys() >= {*WHEELS}
     own = {BELT: belt(context, [drawn[name][0] for name in WHEELS])} if with_belt else {}
+    base = context.export.spec.prototype.base
     skin = max(SKIN_MM, context.export.mesh_error_mm)
+    placed = {one.name: one for one in context.prototype.fasteners}
     fits, worst, clashes = list[str](), 0.0, list[tuple[float, str]]()
-    for pair, shared in overlaps({**solids, **own}):
-        depth = meant_fit(context, pair, shared, skin)
+    for pair, shared in overlaps({**closed, **own}):
+        depth = meant_fit(base, placed, pair, shared, skin)
         if depth is not None:
             fits.append(f"{' and '.join(pair)} {depth:.2f}")
             continue
@@ -78,11 +83,16 @@ def thickness(shared: Any) -> float:
 
 
 def meant_fit(
-    context: PrototypeContext, pair: tuple[str, str], shared: Any, skin: float
+    base: BaseSpec,
+    placed: Mapping[str, PlacedFastener],
+    pair: tuple[str, str],
+    shared: Any,
+    skin: float,
 ) -> float | None:
-    """Depth of a fit that is in the tables and no deeper than there, mm; None of anything else."""
-    placed = {some.name: some for some in context.prototype.fasteners}
-    base = context.export.spec.prototype.base
+    """Depth of a fit that is in the tables and no deeper than there, mm; None of anything else.
+
+    Of a pair of bodies, by name, and the room that they share; `placed`: all fasteners, by name.
+    """
     for name, other in (pair, pair[::-1]):
         screw = placed.get(name)
         if screw and other in TAPPED_MM and re.fullmatch(SCREW, screw.part):

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
-from tbcad_verify.mesh.rays import build_scene, distances_to_planes, first_hits
 from tbcad_verify.mesh.vectors import distances_to_segments, unit
+from tbcad_verify.prototype.bodies import body_scene, placed_meshes
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes, of_roles
+from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
+from tbcad_verify.record.prototype import RECORD
 from tbcad_verify.record.prototype_sections import CameraPlace
 from tbcad_verify.report.checks import Check, CheckName, Unknown, informative, no_faults, require
 from tbcad_verify.types import Floats
@@ -27,6 +27,7 @@ BEFORE_MM = 3.0  # of a hit from the mark it belongs to
 PRESSED_MM3 = 5.0  # that the plug may share with the hub
 CLEAR_MM, STEP_DEG = 1.0, 15.0
 SIDES = {"positive": 0, "negative": 1}
+FILE = RECORD
 CHECKS = {"camera gauge": "faults"}
 
 
@@ -85,27 +86,26 @@ def _sight_faults(
     parts: list[MeasuredPart],
 ) -> Iterator[str]:
     """Rays beside the marks meet near and far arm first, or nothing."""
-    own = build_scene(gauge.placed_mesh)
-    base, still = (
-        build_scene(joined_meshes(of_roles(parts, *roles))[0])
-        for roles in (("base", "cap"), ("frame",))
+    own, base, still = (
+        body_scene(placed_meshes(some))
+        for some in ([gauge], of_roles(parts, "base", "cap"), of_roles(parts, "frame"))
     )
-    balls, pinhole = context.prototype.balls, context.pinhole[:, None]
+    balls, pinhole = context.prototype.balls, np.repeat(context.pinhole[:, None], 3, axis=1)
     centre, radius = balls.columns("bx", 3), balls.body_radius_mm
     for picture in place.pictures:
         marks = np.array(place.marks[SIDES[picture.side]])
         rays, expected = _rays(context, marks)
         # The pinhole is on the axis: rays of the base's frame begin at the same point.
         at = f"at {picture.base_angle_deg:.0f} degrees"
-        if not np.allclose(_first(own, pinhole, rays), expected, atol=BEFORE_MM):
+        if not np.allclose(own.first(pinhole, rays)[1], expected, atol=BEFORE_MM):
             yield f"the marks are not seen one on the other {at}"
-        far = np.where(np.isfinite(expected), expected, 2 * np.linalg.norm(pinhole))
-        if (_first(base, pinhole, rays) < far).any():
+        far = np.where(np.isfinite(expected), expected, 2 * np.linalg.norm(context.pinhole))
+        if (base.first(pinhole, rays)[1] < far).any():
             yield f"the base hides a mark {at}"
         ground = _turned(context, picture.base_angle_deg, rays.T).T
-        if (_first(still, pinhole, ground) < far).any():
+        if (still.first(pinhole, ground)[1] < far).any():
             yield f"the frame hides a mark {at}"
-        ends = [np.broadcast_to(end, centre.shape) for end in (pinhole, marks[1][:, None])]
+        ends = [np.broadcast_to(end, centre.shape) for end in (pinhole[:, :1], marks[1][:, None])]
         if (distances_to_segments(centre, *ends) < radius).any():
             yield f"a ball hides a mark {at}"
 
@@ -122,13 +122,6 @@ def _rays(context: PrototypeContext, marks: Floats) -> tuple[Floats, Floats]:
     # Into the arms: they lie on the side away from azimuth zero.
     beside = np.array([-out - zero, out - zero, -out + zero]) * BESIDE_MM
     return unit((marks[0] + beside - context.pinhole).T), np.array([near, far, np.inf])
-
-
-def _first(scene: Any, origin: Floats, rays: Floats) -> Floats:
-    """(N,) distance to the first facet along unit rays (3, N); inf for none."""
-    facet = first_hits(scene, origin, rays)
-    distance = distances_to_planes(scene, np.maximum(facet, 0), origin, rays)
-    return np.where(facet >= 0, distance, np.inf)
 
 
 def _room_faults(

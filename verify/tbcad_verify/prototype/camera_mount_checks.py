@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.record.prototype import RECORD
 from tbcad_verify.report.checks import Check, CheckName, informative, no_faults, require
 from tbcad_verify.step.solids_text import TextSolid, holes
 from tbcad_verify.types import Floats
@@ -25,6 +26,7 @@ LEAST = {"across_mm": 4.0, "out_mm": 2.5, "along_plate_mm": 4.0}
 LEAST |= {"yaw_deg": 2.0, "roll_deg": 0.9, "pitch_deg": 0.9}
 SAME_MM = 1e-6
 SHARE = 1e-6
+FILE = RECORD
 CHECKS = {"camera mount": "faults"}
 
 

@@ -23,6 +23,7 @@ NEWTON_STEPS = 8
 MIN_VERTICES = 8
 CENTRE_UM = 5.0
 FORM_UM = 1.0
+FILE = ("cap",)
 CHECKS = {"cap fronts": "um", "cap bodies": "um", "cap form": "um"}
 
 
@@ -101,6 +102,8 @@ def checks(
     names: list[CheckName], context: PrototypeContext, caps: list[MeasuredCap]
 ) -> list[Check]:
     """Fronts and bodies against the record: errors less the uncertainty of float32; their form."""
+    if not caps:
+        return []
     balls, made = context.prototype.balls, []
     spheres = [[cap.front for cap in caps], [cap.body for cap in caps]]
     recorded = ("cx", balls.radius_mm), ("bx", balls.body_radius_mm)

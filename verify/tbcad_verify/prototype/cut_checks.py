@@ -1,51 +1,42 @@
-"""What is cut, drilled or folded: DXF files and drill table against bodies of the assembly.
+"""What is cut or drilled: DXF files and drill table against bodies of the assembly.
 
-All that is on the layer `cut` is a cut of the body. The shroud is a closed box of card round
-everything, and its patterns fold to its panels.
+All that is on the layer `cut` is a cut of the body.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tbcad_verify.prototype.assembly import VIEWS, Shape
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.flat_drawings import FlatDrawing, read_dxf
 from tbcad_verify.prototype.sheets import sheet_faults
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
 from tbcad_verify.record.prototype import PLATE_HOLES
-from tbcad_verify.record.prototype_sections import Panel, Shroud
-from tbcad_verify.report.checks import Check, CheckName, at_most, no_faults, require
+from tbcad_verify.report.checks import Check, CheckName, no_faults, require
 from tbcad_verify.step.solids_text import TextSolid, holes
-from tbcad_verify.types import Floats
 
-CHECKS, SHROUD = {"drawings": "faults", "plate holes": "faults"}, {"shroud": "faults"}
+FILE = "drawing_*.dxf, plate_holes.csv"
+CHECKS = {"drawings": "faults", "plate holes": "faults"}
 DRAWN = ("plate", "upright_left", "wheel", "lamp_1")  # bodies of the assembly, where there are such
 TAPPED_M5_MM = 4.2
 ROUND = ("cylinder", "sphere")
 CORNERS = 4  # of a strip
 SAME_MM = 1e-6
-SINGLE_MM = 2e-3  # of the GLB's single precision
-FLAP_MM = 15.0  # width of a flap
-FLAPS = {"shroud_front": 3, "shroud_back": 3, "shroud_right": 1}  # folds of panels that have any
-PREFIX = "shroud_"
-SHEET = re.compile(r"CARD-(\d+)x(\d+)x(\d+)")
 
 
 def checks(
-    names: list[CheckName], context: PrototypeContext, assembly: Mapping[str, TextSolid]
+    names: list[CheckName], context: PrototypeContext, solids: Mapping[str, TextSolid]
 ) -> list[Check]:
     """All drawings, and the drill table of the plate."""
-    drawings = [*_drawing_faults(context, assembly), *_cap_faults(context, assembly)]
+    drawings = [*_drawing_faults(context, solids), *_cap_faults(context, solids)]
     folder, record = context.export.folder, context.prototype
     for name in [one.pdf for one in record.drawn]:
         if (folder / name).exists():
             drawings += sheet_faults(read(folder, name, MAX_TEXT_BYTES))
-    faults = drawings, _table_faults(context, assembly)
+    faults = drawings, _table_faults(context, solids)
     return [no_faults(*pair) for pair in zip(names, faults, strict=True)]
 
 
@@ -57,14 +48,15 @@ def _drawing_faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]
         yield f"{part}: drawn without need" if part in drawings else f"{part}: no drawing"
     for name, part in needed.items():
         if part in drawings and name in assembly:
-            flat = _flat(context, drawings[part])
+            flat = flat_drawing(context, drawings[part])
             if name == "lamp_1":
                 yield from _strip_faults(context, assembly[name], flat)
             else:
                 yield from _board_faults(context, name, assembly[name], flat)
 
 
-def _flat(context: PrototypeContext, file: str) -> FlatDrawing:
+def flat_drawing(context: PrototypeContext, file: str) -> FlatDrawing:
+    """A drawing of the export, as it is cut. Unknown: it cannot be read."""
     return read_dxf(read(context.export.folder, file, MAX_TEXT_BYTES))
 
 
@@ -131,7 +123,10 @@ def _cap_faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]) ->
     """The profile of a cap, drawn at full size: arcs of its spheres, corners on its round faces."""
     for cap in context.prototype.caps:
         name = f"cap_{cap.ball}"
-        flat, solid = _flat(context, cap.dxf), require(assembly.get(name), f"there is no {name}")
+        flat, solid = (
+            flat_drawing(context, cap.dxf),
+            require(assembly.get(name), f"there is no {name}"),
+        )
         radii = {kind: [one.radius for one in solid.faces if one.kind == kind] for kind in ROUND}
         off = [away(flat.arcs[:, 2], radii["sphere"]), away(radii["sphere"], flat.arcs[:, 2])]
         out = np.abs(flat.corners[1:-1, 0])
@@ -161,86 +156,3 @@ def _table_faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]) 
     for k, place in enumerate(np.column_stack([table.x_mm, table.y_mm]), 1):
         if (np.abs(places - place).max(axis=1) <= SAME_MM).sum() != 1:
             yield f"hole {k} is elsewhere in the plate"
-
-
-def shroud_checks(
-    names: list[CheckName],
-    context: PrototypeContext,
-    drawn: Mapping[str, Shape],
-    solids: Mapping[str, TextSolid],
-) -> list[Check]:
-    """Panels against the assembly, patterns against panels, and all bodies inside."""
-    shroud = context.prototype.shroud
-    if shroud is None:
-        asked = context.export.spec.prototype.light.shroud is True
-        return [at_most(names[0], float(asked), 0, "the spec has a shroud, the record has none")]
-    return [no_faults(names[0], _shroud_faults(context, shroud, drawn, solids))]
-
-
-def _shroud_faults(
-    context: PrototypeContext,
-    shroud: Shroud,
-    drawn: Mapping[str, Shape],
-    solids: Mapping[str, TextSolid],
-) -> Iterator[str]:
-    sheet = SHEET.fullmatch(shroud.sheet)
-    if not sheet:
-        yield f"{shroud.sheet} is no sheet of card"
-        return
-    length, width, thick = (float(size) for size in sheet.groups())
-    boxes: dict[str, Floats] = {}
-    for panel in shroud.panels:
-        corners = require(solids.get(panel.name), f"the assembly has no {panel.name}").corners
-        boxes[panel.name] = np.stack([corners.min(axis=0), corners.max(axis=0)])
-        yield from _panel_faults(context, panel, boxes[panel.name], thick, (length, width))
-    yield from _box_faults(context, boxes, drawn, thick)
-
-
-def _panel_faults(
-    context: PrototypeContext, panel: Panel, box: Floats, thick: float, sheet: tuple[float, float]
-) -> Iterator[str]:
-    """One panel's size, and its pattern: outline less flaps, and folds on the panel's edges."""
-    sides, size = np.sort(box[1] - box[0]), np.array(panel.size)
-    if np.abs(sides - np.sort([thick, *size])).max() > SAME_MM:
-        yield f"{panel.name} is drawn {sides[1]:g} x {sides[2]:g} mm and {sides[0]:g} mm thick"
-    flat = _flat(context, panel.dxf)
-    if [len(one) for one in (flat.outlines, flat.circles, flat.lines, flat.arcs)] != [1, 0, 0, 0]:
-        yield f"{panel.dxf}: another cut than one outline"
-        return
-    corners, folds = flat.corners, flat.folds
-    inside = np.minimum(corners, size - corners).min(axis=1)
-    if inside.max() > FLAP_MM + SAME_MM:
-        yield f"{panel.dxf}: its outline is {inside.max():g} mm inside the panel"
-    flaps = np.zeros(4)  # below, left, above, right
-    for line in folds:
-        edges = [line[:, 1], line[:, 0], size[1] - line[:, 1], size[0] - line[:, 0]]
-        flaps += FLAP_MM * np.array([np.abs(edge).max() < SAME_MM for edge in edges])
-    if len(folds) != FLAPS.get(panel.name, 0) or (flaps > 0).sum() != len(folds):
-        yield f"{panel.dxf}: {len(folds)} folds"
-    low, high = -flaps[[1, 0]], size + flaps[[3, 2]]
-    if np.abs(np.stack([corners.min(axis=0) - low, corners.max(axis=0) - high])).max() > SAME_MM:
-        yield f"{panel.dxf}: its outline is not that of the panel with its flaps"
-    if (np.sort(high - low) > np.sort(sheet) + SAME_MM).any():
-        yield f"{panel.name} is larger than its sheet"
-
-
-def _box_faults(
-    context: PrototypeContext, boxes: Mapping[str, Floats], drawn: Mapping[str, Shape], thick: float
-) -> Iterator[str]:
-    """The panels close a box, and every body is inside, not nearer to the walls than asked."""
-    walls = (("back", "right", "floor"), 1), (("front", "left", "lid"), 0)
-    inner = np.array(
-        [[boxes[PREFIX + name][end, k] for k, name in enumerate(some)] for some, end in walls]
-    )
-    whole = np.stack(list(boxes.values()))
-    outer = np.stack([whole[:, 0].min(axis=0), whole[:, 1].max(axis=0)])
-    if np.abs(outer - inner - [[-thick], [thick]]).max() > SAME_MM:
-        yield "the panels do not close a box"
-    gap = context.export.spec.prototype.light.shroud_gap_mm - SINGLE_MM
-    for name, (points, _) in drawn.items():
-        if name in VIEWS or name.startswith(PREFIX):
-            continue
-        near = np.minimum(points.min(axis=0) - inner[0], inner[1] - points.max(axis=0))
-        near[2] = inner[1, 2] - points[:, 2].max()
-        if near.min() < gap or points[:, 2].min() < inner[0, 2] - SINGLE_MM:
-            yield f"{name} is {near.min():.2f} mm from the shroud"

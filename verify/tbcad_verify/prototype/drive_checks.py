@@ -13,6 +13,7 @@ import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
+from tbcad_verify.record.prototype import RECORD
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -48,6 +49,7 @@ AXIS_MM = 1e-6
 PIN_MM, PIN_OUT_MM, DISC_MM = 4.0, 44.0, 5.0
 PRESSURE_MPA, SHEAR_MPA = 20.0, 230.0
 FALL_STEPS = 100_001  # of the travel: the energy is flat where it is largest
+FILE = RECORD
 CHECKS = {"drive": "faults", "motor bearing": "N", "power off": "faults", "fall energy": "J"}
 
 

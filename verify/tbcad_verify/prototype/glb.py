@@ -1,108 +1,35 @@
 """The GLB of an assembly, by a closed grammar: opaque or clear bodies, each at its place.
 
 A viewer obeys what the triangles do not show: addresses of other files, extensions, animations,
-scales of nodes, second scenes, emission. None of them has a use here, so whatever tbcad does not
-write is refused by its name. Source: glTF 2.0, chapters 3 and 4.
+scales of nodes, second scenes, emission. None of them has a use here. So names, colours, numbers
+and groups are read, and the only document that tbcad writes of them must be the one that is there.
+Source: glTF 2.0, chapters 3 and 4.
 """
 
 from __future__ import annotations
 
 import json
 import struct
-from itertools import accumulate
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tbcad_verify.record.files import FileBytes
-from tbcad_verify.record.validation import key_path, refuse_doubles
+from tbcad_verify.record.validation import refuse_doubles, shown
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Floats, Ints
 
 MAGIC, VERSION, JSON, BINARY = b"glTF", 2, b"JSON", b"BIN\0"
 # Metres, y up: the columns of what the root does to millimetres, z up.
-UPRIGHT = [0.001, 0, 0, 0, 0, 0, -0.001, 0, 0, 0.001, 0, 0, 0, 0, 0, 1]
+UPRIGHT = [0.001, 0.0, 0.0, 0.0, 0.0, 0.0, -0.001, 0.0, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
 ASSET = {"version": "2.0", "generator": "https://github.com/mikedh/trimesh"}
 GLOSS = {"roughnessFactor": 0.6, "metallicFactor": 0.1}
-WHOLE, SINGLE = 5125, 5126  # types of components
-
-Number = Annotated[int, Field(ge=0)]
-
-
-class Closed(BaseModel):
-    """An object without other keys."""
-
-    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
-
-
-class Accessor(Closed):
-    """Numbers of one kind, all of a view."""
-
-    componentType: Literal[5125, 5126]
-    type: Literal["SCALAR", "VEC3"]
-    byteOffset: Literal[0] = 0
-    bufferView: Number
-    count: Number
-    max: list[float]
-    min: list[float]
-
-
-class BufferView(Closed):
-    """A piece of the binary chunk."""
-
-    buffer: Literal[0]
-    byteOffset: Number
-    byteLength: Number
-
-
-class Primitive(Closed):
-    """Triangles."""
-
-    attributes: dict[Literal["POSITION"], Number]  # corners only, so that facets are flat
-    indices: Number
-    mode: Literal[4]
-    material: Number
-
-
-class GlbMesh(Closed):
-    """One body."""
-
-    name: str
-    extras: dict[str, str] = Field({}, max_length=0)
-    primitives: list[Primitive] = Field(min_length=1, max_length=1)
-
-
-class Material(Closed):
-    """How one body looks."""
-
-    name: str
-    pbrMetallicRoughness: dict[str, Any]  # colour as light, and gloss
-    alphaMode: Literal["OPAQUE", "BLEND"]
-    doubleSided: Literal[False]
-
-
-class Node(Closed):
-    """The root, a group, or a body; only the root is turned and scaled."""
-
-    name: str
-    matrix: list[float] = []
-    children: list[Number] = []
-    mesh: int = -1
-
-
-class Document(Closed):
-    """The JSON chunk."""
-
-    asset: dict[str, str]
-    scene: Literal[0]
-    scenes: list[dict[str, list[int]]]
-    nodes: list[Node] = Field(min_length=1)
-    meshes: list[GlbMesh]
-    materials: list[Material]
-    accessors: list[Accessor]
-    bufferViews: list[BufferView]
-    buffers: list[dict[str, int]]
+# By type of an accessor: its numbers, how many there are of a corner, and further keys.
+KINDS: dict[str, tuple[str, int, dict[str, int]]] = {
+    "SCALAR": ("<u4", 1, {"componentType": 5125}),
+    "VEC3": ("<f4", 3, {"componentType": 5126, "byteOffset": 0}),
+}
+NOTHING = object()
 
 
 class DrawnBody(NamedTuple):
@@ -117,13 +44,13 @@ def read_glb(blob: FileBytes) -> dict[str, DrawnBody]:
     """Bodies by name. Unknown: it is no GLB, or has something that tbcad does not write."""
     try:
         text, binary = _chunks(blob.data.tobytes())
-        document = Document.model_validate(json.loads(text, object_pairs_hook=refuse_doubles))
-        return _bodies(document, binary)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise Unknown(f"{blob.name}: {key_path(first['loc'])}: {first['msg']}") from error
-    except (ValueError, IndexError, struct.error) as error:
-        raise Unknown(f"{blob.name}: no GLB of tbcad's ({error})") from error
+        document = json.loads(text, object_pairs_hook=refuse_doubles)
+        expected, bodies = _written(document, binary)
+    except (ValueError, LookupError, TypeError, struct.error) as error:
+        raise Unknown(f"{blob.name}: no GLB of tbcad's ({error!r})") from error
+    if other := _difference(document, expected):
+        raise Unknown(f"{blob.name}: {other}")
+    return bodies
 
 
 def _chunks(data: bytes) -> tuple[bytes, bytes]:
@@ -136,56 +63,85 @@ def _chunks(data: bytes) -> tuple[bytes, bytes]:
     return data[20 : 20 + length], data[28 + length :]
 
 
-def _bodies(document: Document, binary: bytes) -> dict[str, DrawnBody]:
-    root, *others = document.nodes
-    below = sorted(k for node in document.nodes for k in node.children)
-    meshes = sorted(node.mesh for node in others if node.mesh >= 0)
-    if root.matrix != UPRIGHT or any(node.matrix for node in others):
-        raise ValueError("a node is moved or scaled; only the root is, to metres with y up")
-    if below != list(range(1, len(document.nodes))) or meshes != list(range(len(document.meshes))):
+def _written(given: Any, binary: bytes) -> tuple[dict[str, Any], dict[str, DrawnBody]]:
+    """What tbcad writes of the names, groups, colours and numbers of a document; its bodies.
+
+    ValueError, LookupError, TypeError: they are none, or not those of bodies.
+    """
+    root, *others = given["nodes"]
+    drawn = sorted((one for one in others if "mesh" in one), key=lambda one: int(one["mesh"]))
+    below = sorted(k for one in given["nodes"] for k in one.get("children", ()))
+    numbers = [one["mesh"] for one in drawn], list(range(len(given["meshes"])))
+    if below != list(range(1, 1 + len(others))) or numbers[0] != numbers[1]:
         raise ValueError("each node must be in one group, and each mesh in one node")
-    parts = [one for mesh in document.meshes for one in mesh.primitives]
-    used = {k for one in parts for k in (one.indices, one.attributes["POSITION"])}
-    if used != set(range(len(document.accessors))) or len(document.materials) != len(meshes):
-        raise ValueError("an accessor or a material is no mesh's")
-    lengths = [0, *accumulate(view.byteLength for view in document.bufferViews)]
-    offsets = [*(view.byteOffset for view in document.bufferViews), len(binary)]
-    if offsets != lengths or document.buffers != [{"byteLength": len(binary)}]:
+    if not all(isinstance(one["name"], str) for one in given["nodes"]):
+        raise ValueError("a node has no name")
+    arrays, accessors, views, start = list[Floats | Ints](), [], [], 0
+    for k, one in enumerate(given["accessors"]):
+        dtype, width, keys = KINDS[one["type"]]
+        rows = np.frombuffer(binary, dtype, width * one["count"], start).reshape(-1, width)
+        if not np.isfinite(rows).all():
+            raise ValueError(f"accessor {k} has numbers that are not finite")
+        ends = {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+        accessors.append({"type": one["type"], "bufferView": k, "count": len(rows), **keys, **ends})
+        views.append({"buffer": 0, "byteOffset": start, "byteLength": rows.nbytes})
+        arrays.append(rows)
+        start += rows.nbytes
+    meshes, materials, bodies, used = [], [], dict[str, DrawnBody](), set[int]()
+    for k, node in enumerate(drawn):
+        name, part = node["name"], given["meshes"][k]["primitives"][0]
+        corners, indices = part["attributes"]["POSITION"], part["indices"]
+        used |= {corners, indices}
+        points, faces = arrays[corners], arrays[indices].reshape(-1, 3)
+        if points.shape[1] != 3 or faces.max(initial=0) >= len(points):
+            raise ValueError(f"{name} has facets without corners")
+        colour = [
+            float(x) for x in given["materials"][k]["pbrMetallicRoughness"]["baseColorFactor"]
+        ]
+        primitive = {"attributes": {"POSITION": corners}, "indices": indices, "mode": 4}
+        meshes.append({"name": name, "extras": {}, "primitives": [{**primitive, "material": k}]})
+        look = {"baseColorFactor": colour, **GLOSS}
+        alpha = {"alphaMode": "OPAQUE" if colour[3] == 1 else "BLEND", "doubleSided": False}
+        materials.append({"name": name, "pbrMetallicRoughness": look, **alpha})
+        points, faces = points.astype(np.float64), faces.astype(np.int64)
+        bodies[name] = DrawnBody(points, faces, tuple(colour))
+    if used != set(range(len(arrays))) or len(bodies) != len(drawn):
+        raise ValueError("an accessor is no mesh's, or a name is there twice")
+    expected = {
+        "asset": ASSET,
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [
+            {"name": root["name"], "children": root["children"], "matrix": UPRIGHT},
+            *({key: one[key] for key in ("name", _below(one))} for one in others),
+        ],
+        "meshes": meshes,
+        "materials": materials,
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(binary)}],
+    }
+    if start != len(binary):
         raise ValueError("the binary chunk must be its views, without gaps")
-    if (document.asset, document.scenes) != (ASSET, [{"nodes": [0]}]):
-        raise ValueError(f"asset or scenes are others than {ASSET} and one of all")
-    return {node.name: _body(document, binary, node, k) for node in others if (k := node.mesh) >= 0}
+    return expected, bodies
 
 
-def _body(document: Document, binary: bytes, node: Node, k: int) -> DrawnBody:
-    mesh, (part,) = document.meshes[k], document.meshes[k].primitives
-    material = document.materials[part.material]
-    if len({node.name, mesh.name, material.name}) > 1 or node.children:
-        raise ValueError(f"{node.name} has another mesh or material")
-    faces = _numbers(document, binary, part.indices, WHOLE).reshape(-1, 3)
-    points = _numbers(document, binary, part.attributes["POSITION"], SINGLE)
-    colour = tuple(material.pbrMetallicRoughness.get("baseColorFactor", ()))
-    if material.pbrMetallicRoughness != {"baseColorFactor": [*colour], **GLOSS}:
-        raise ValueError(f"{node.name} has another gloss than {GLOSS}")
-    if (material.alphaMode == "OPAQUE") != (colour[3] == 1):
-        raise ValueError(f"{node.name} is {material.alphaMode} with opacity {colour[3]:g}")
-    if len(faces) and faces.max() >= len(points):
-        raise ValueError(f"{node.name} has facets without corners")
-    return DrawnBody(points.astype(np.float64), faces.astype(np.int64), colour)
+def _below(node: Any) -> str:
+    return "mesh" if "mesh" in node else "children"
 
 
-def _numbers(document: Document, binary: bytes, k: int, kind: int) -> Floats | Ints:
-    """(N, 1) whole numbers or (N, 3) coordinates of an accessor, with the ends that it tells."""
-    accessor, view = document.accessors[k], document.bufferViews[k]
-    width, dtype = (1, "<u4") if kind == WHOLE else (3, "<f4")
-    name = "SCALAR" if kind == WHOLE else "VEC3"
-    told = accessor.componentType, accessor.type, accessor.bufferView, 4 * width * accessor.count
-    if told != (kind, name, k, view.byteLength):
-        raise ValueError(f"accessor {k} is another than that of a mesh")
-    rows = np.frombuffer(binary, dtype, width * accessor.count, view.byteOffset).reshape(-1, width)
-    ends = [accessor.min, accessor.max]
-    if not np.isfinite(rows).all() or not np.array_equal(
-        ends, [rows.min(axis=0), rows.max(axis=0)]
-    ):
-        raise ValueError(f"accessor {k} has other numbers than it tells")
-    return rows
+def _difference(given: Any, allowed: Any, path: str = "") -> str:
+    """Where two JSON values differ first, and how; empty where they do not."""
+    if isinstance(given, dict) and isinstance(allowed, dict):
+        pairs = [
+            (key, given.get(key, NOTHING), allowed.get(key, NOTHING)) for key in given | allowed
+        ]
+    elif isinstance(given, list) and isinstance(allowed, list) and len(given) == len(allowed):
+        pairs = [(str(k), *pair) for k, pair in enumerate(zip(given, allowed, strict=True))]
+    elif type(given) is type(allowed) and given == allowed:
+        return ""
+    else:
+        told = ["none" if one is NOTHING else shown(one) for one in (given, allowed)]
+        return f"{path} is {told[0]}, allowed is {told[1]}"
+    inner = (_difference(one, two, f"{path}.{key}".strip(".")) for key, one, two in pairs)
+    return next(filter(None, inner), "")

@@ -1,4 +1,4 @@
-"""What holds each ball and takes up a cap's tilt: loads by turning the base, measured pockets.
+"""What holds each ball: loads by turning the base, measured pockets.
 
 Pull of a disc magnet on a steel ball or on another disc magnet is that of rings of magnetic charge.
 The faces of a magnet are discs of charge of density Br / mu0; each is divided into rings. What a
@@ -9,7 +9,6 @@ integral.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from functools import cache
 
@@ -17,12 +16,12 @@ import numpy as np
 from scipy.special import ellipe
 
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.record.prototype import RECORD
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
     Unknown,
     at_least,
-    each_at_most,
     require,
     worst_offenders,
 )
@@ -38,11 +37,9 @@ MIN_RATIO = 2.0  # of the force there is over the force needed
 GRAVITY = 9.80665  # m/s^2, standard
 STEPS = 720  # base angles in a turn
 GLUE_MPA = 0.35
-# Once the LEDs have shown it, a degree takes 0.06 mm of the 60: so much tilt takes what a design's
-# balls have to spare (0.04 mm at n = 18), a tenth of its share of the margin (docs/prototype.md).
-TILT_DEG = 0.5
 ON_AXIS_MM, PARALLEL = 1e-5, 1e-6  # of a cylinder's axis from its seat's
-CHECKS, TILT = {"hold ratio": "1"}, {"cap tilt": "deg"}
+FILE = RECORD
+CHECKS = {"hold ratio": "1"}
 
 Rings = tuple[Floats, Floats, Floats]
 """Radii, places along the axis, charges over the density, of n rings, mm, mm, mm^2."""
@@ -54,38 +51,14 @@ def checks(
     names: list[CheckName],
     context: PrototypeContext,
     carriers: list[TextSolid],
-    caps: list[TextSolid],
+    cap_solids: list[TextSolid],
 ) -> list[Check]:
     """The least ratio of the force that holds a ball over the force needed."""
     needed = forces_needed(context)
-    holds = [_hold(context, carriers, caps, k) for k in range(len(needed))]
+    holds = [_hold(context, carriers, cap_solids, k) for k in range(len(needed))]
     ratio, ids = np.array(holds) / needed, context.prototype.balls.names(np.arange(len(holds)))
     weak = worst_offenders(ids, -ratio, "", ratio < MIN_RATIO, ".3g")
     return [at_least(names[0], float(ratio.min()), MIN_RATIO, weak)]
-
-
-def tilt_checks(
-    names: list[CheckName],
-    context: PrototypeContext,
-    carriers: list[TextSolid],
-    caps: list[TextSolid],
-) -> list[Check]:
-    """Largest tilt of each cap about its body's centre, by its spigot in the carrier's pocket."""
-    balls = context.prototype.balls
-    which = np.flatnonzero(balls.cap)
-    tilts = []
-    for k, cap in zip(which.tolist(), caps, strict=True):
-        spigots = [*_cylinders(context, [cap], k, hollow=False)]
-        if len({round(radius, 6) for radius, *_ in spigots}) != 1:
-            raise Unknown(f"the cap of ball {k + 1} has no spigot")
-        radius, end = spigots[0][0], max(end for *_, end in spigots)
-        sockets = _cylinders(context, carriers, k, hollow=True)
-        play = min((socket for socket, *_ in sockets), default=np.nan) - radius
-        if not play > 0:
-            raise Unknown(f"the spigot of ball {k + 1} does not go into a pocket")
-        tilts.append(math.degrees(math.asin(play / end)))
-    ids = balls.names(which)
-    return [each_at_most(names[0], ids, np.array(tilts), TILT_DEG, "deg", "tilts: ")]
 
 
 def forces_needed(context: PrototypeContext) -> Floats:
@@ -149,7 +122,7 @@ def _require_magnet(context: PrototypeContext, k: int, radius: float, height: fl
 
 def _pocket(context: PrototypeContext, solids: list[TextSolid], k: int) -> Pocket | None:
     """The narrowest hollow cylinder on a seat's axis behind the ball, or in a cap."""
-    found = [*_cylinders(context, solids, k, hollow=True)]
+    found = [*cylinders(context, solids, k, hollow=True)]
     if not found:
         return None
     radius = min(round(one[0], 6) for one in found)
@@ -157,7 +130,7 @@ def _pocket(context: PrototypeContext, solids: list[TextSolid], k: int) -> Pocke
     return radius, min(start for _, start, _ in same), max(end for *_, end in same)
 
 
-def _cylinders(
+def cylinders(
     context: PrototypeContext, solids: list[TextSolid], k: int, *, hollow: bool
 ) -> Iterator[Pocket]:
     """Cylinders on a seat's axis that end behind the body's centre."""

@@ -22,10 +22,12 @@ import numpy as np
 from tbcad_verify.prototype.assembly import Shape, closed_solid
 from tbcad_verify.prototype.bodies import turning
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.record.prototype import RECORD
 from tbcad_verify.record.prototype_sections import PlacedFastener
 from tbcad_verify.report.checks import Check, CheckName, no_faults, short_list
 from tbcad_verify.types import Floats
 
+FILE = RECORD
 CHECKS = {"key access": "screws"}
 # Width across flats by nominal thread: of heads (ISO 4762; 1/4-20 UNC has 3/16 in, and the next ISO
 # key is taken) and of set screws (ISO 4026).

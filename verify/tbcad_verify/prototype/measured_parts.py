@@ -13,7 +13,6 @@ from tbcad_verify.mesh.mesh import (
     Mesh,
     Topology,
     examine_topology,
-    join_meshes,
     mass_properties,
     mesh_from_facets,
 )
@@ -38,6 +37,7 @@ ROTATION = 1e-9  # largest deviation of the axes from a rotation
 BED_MM = 0.05
 # Round bosses meet ribs in grooves that run out to a few degrees; a sharper bend is a fold.
 FOLD_RAD = 0.02
+PLACED = ("base", "cap", "stage", "frame")  # roles of the parts that are in the prototype
 POSE = {"print pose": "off a rotation", "on the bed": "mm"}
 
 
@@ -112,16 +112,6 @@ def pose_checks(names: list[CheckName], part: PrintedPart, mesh: Mesh) -> list[C
 def of_roles(parts: list[MeasuredPart], *roles: str) -> list[MeasuredPart]:
     """The parts of some roles."""
     return [part for part in parts if part.part.role in roles]
-
-
-def joined_meshes(parts: list[MeasuredPart]) -> tuple[Mesh, Ints]:
-    """Placed meshes as one, and the part that each facet belongs to.
-
-    Unknown: one could not be measured.
-    """
-    meshes = [part.placed_mesh for part in parts]
-    owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
-    return join_meshes(meshes), owner
 
 
 def distance_to_facets(point: Floats, mesh: Mesh, facets: Ints) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -12,7 +12,7 @@ from tbcad_verify.mesh.vectors import dot, norm, polar_and_azimuth, unit, wrappe
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control.gcode_checks import program_check
 from tbcad_verify.record.poses import POSE_MM
-from tbcad_verify.record.prototype import BALLS, PLAN, PROGRAM, STOPS
+from tbcad_verify.record.prototype import BALLS, PLAN, PROGRAM
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -21,29 +21,28 @@ from tbcad_verify.report.checks import (
     guarded_each,
     no_faults,
 )
-from tbcad_verify.types import Ints
 
 DENSITIES_G_MM3 = 1.5e-3, 20e-3  # of anything that balls are made of
 SAME_DIRECTION = 1e-9
-TURNS = (0.0, 180.0)
 CHECKS = (
     ("ball positions", BALLS, "mm off"),
     ("ball sizes", BALLS, "balls"),
-    ("plan mirrors", PLAN, "missing, doubled or foreign"),
-    ("plan twins", PLAN, "mirrors"),
-    ("plan stops", STOPS, "faults"),
+    ("plan", PLAN, "faults"),
     ("plan program", PROGRAM, "faults"),
 )
 
 
 def checks(context: PrototypeContext) -> list[Check]:
     """Balls against the design; plan, stops and program against mirrors, balls and each other."""
-    jobs = map(_counted, (_size_faults, _mirror_faults, _twin_faults, _stop_faults))
-    return guarded_each(CHECKS, (_positions, *jobs, program_check), context)
+    return guarded_each(CHECKS, (_positions, _sizes, _plan, program_check), context)
 
 
-def _counted(faults: Callable[[PrototypeContext], Iterator[str]]) -> Callable[..., Check]:
-    return lambda name, context: no_faults(name, faults(context))
+def _sizes(name: CheckName, context: PrototypeContext) -> Check:
+    return no_faults(name, _size_faults(context))
+
+
+def _plan(name: CheckName, context: PrototypeContext) -> Check:
+    return no_faults(name, _plan_faults(context))
 
 
 def _positions(name: CheckName, context: PrototypeContext) -> Check:
@@ -91,29 +90,8 @@ def _size_faults(context: PrototypeContext) -> Iterator[str]:
     yield from (f"{name} has not its diameter, or no mass of it" for name in balls.names(bad))
 
 
-def _mirror_faults(context: PrototypeContext) -> Iterator[str]:
-    """Each of this camera's mirrors once with the object at 0 degrees, all others once at 180.
-
-    Rows are numbered, and name balls that exist.
-    """
-    plan, rows = context.prototype.plan, context.export.mirrors
-    for turn in TURNS:
-        of_camera = (rows.camera == context.prototype.camera) == (turn == 0)
-        expected = [rows.ids[k] for k in np.flatnonzero(of_camera).tolist()]
-        count = Counter(plan.mirror[k] for k in np.flatnonzero(plan.turn == turn).tolist())
-        yield from (name for name in expected if count[name] != 1)
-        yield from sorted(set(count) - set(expected))
-    rows_that_are = {
-        "at another object angle": ~np.isin(plan.turn, TURNS),
-        "of no ball": (plan.ball < 1) | (plan.ball > len(context.prototype.balls)),
-        "out of order": plan.order != np.arange(1, len(plan) + 1),
-    }
-    for what, bad in rows_that_are.items():
-        yield from (f"row {k + 1} {what}" for k in np.flatnonzero(bad).tolist())
-
-
-def twins(context: PrototypeContext) -> Ints:
-    """(m,) row of mirrors.csv of the mirror that each one shows with the object at 180 degrees.
+def twins(context: PrototypeContext) -> list[str]:
+    """Ids of the m mirrors that are shown with the object at 180 degrees as each is at 0.
 
     Rotated by 180 degrees about z, direction (x, y, z) becomes (-x, -y, z).
 
@@ -129,33 +107,36 @@ def twins(context: PrototypeContext) -> Ints:
     if not distance.max() <= SAME_DIRECTION:
         missing = context.mirror_ids[int(distance.argmax())]
         raise Unknown(f"no mirror of the other camera is {missing} rotated by 180 degrees")
-    return np.asarray(others[nearest])
+    return [rows.ids[k] for k in others[nearest].tolist()]
 
 
-def _twin_faults(context: PrototypeContext) -> Iterator[str]:
-    """With the object at 180 degrees, each mirror uses the ball and stop of its twin."""
-    plan, rows, first = context.prototype.plan, context.export.mirrors, context.plan_rows
-    at_180 = {plan.mirror[k]: k for k in np.flatnonzero(plan.turn == TURNS[1]).tolist()}
-    ids = [rows.ids[k] for k in twins(context).tolist()]
-    row = np.array([at_180.get(name, -1) for name in ids])
-    same = row >= 0
-    for column in (plan.ball, plan.angle, plan.stop):
-        same &= column[row] == column[first]
-    yield from (f"{ids[k]} by another ball or stop" for k in np.flatnonzero(~same).tolist())
+def _plan_faults(context: PrototypeContext) -> Iterator[str]:
+    """Pictures that are missing, doubled or foreign, or not by ball and stop of their twin's.
 
-
-def _stop_faults(context: PrototypeContext) -> Iterator[str]:
-    """Stops are numbered, ascending, within the swing, and as the plan has them."""
-    stops, plan = context.prototype.stops, context.prototype.plan
+    Each of this camera's mirrors has one with the object at 0 degrees, each of the others' one at
+    180; stops are those of the table, which ascend within the swing.
+    """
+    plan, stops = context.prototype.plan, context.prototype.stops
     low, high = context.prototype.swing
-    if not (stops.stop == np.arange(1, len(stops) + 1)).all():
-        yield "not numbered from 1"
-    if not (np.diff(stops.angle) > 0).all():
-        yield "angles do not ascend"
-    beyond = np.flatnonzero((stops.angle < low) | (stops.angle > high))
-    yield from (f"stop {k + 1} beyond the swing" for k in beyond.tolist())
-    known = (plan.stop >= 1) & (plan.stop <= len(stops))
-    unlike = np.flatnonzero(~known | (stops.angle[np.where(known, plan.stop, 1) - 1] != plan.angle))
-    yield from (f"row {k + 1} of the plan at another angle" for k in unlike.tolist())
-    unused = sorted({*range(1, len(stops) + 1)} - {*plan.stop.tolist()})
-    yield from (f"stop {number} is not in the plan" for number in unused)
+    angles = dict(enumerate(stops.angle.tolist(), 1))
+    if stops.stop.tolist() != list(angles) or not (np.diff(stops.angle) > 0).all():
+        yield "stops are not numbered from 1, or their angles do not ascend"
+    yield from (f"stop {k} beyond the swing" for k, one in angles.items() if not low <= one <= high)
+    yield from (f"stop {k} is not in the plan" for k in sorted({*angles} - {*plan.stop.tolist()}))
+    columns = (plan.turn, plan.mirror, plan.ball, plan.stop, plan.angle)
+    rows = list(zip(*(np.asarray(one).tolist() for one in columns), strict=True))
+    shown = {(turn, mirror): tuple(how) for turn, mirror, *how in rows}
+    pairs = list(zip(context.mirror_ids, twins(context), strict=True))
+    expected = {key for one, two in pairs for key in ((0.0, one), (180.0, two))}
+    count = Counter((turn, mirror) for turn, mirror, *_ in rows)
+    for turn, mirror in sorted(expected | set(count)):
+        if count[turn, mirror] != 1 or (turn, mirror) not in expected:
+            yield f"{mirror} is shown {count[turn, mirror]} times with the object at {turn:g} deg"
+    for one, two in pairs:
+        if shown.get((0.0, one)) != shown.get((180.0, two)):
+            yield f"{two} by another ball or stop than {one}"
+    for k, (_, _, ball, stop, angle) in enumerate(rows, 1):
+        if plan.order[k - 1] != k or not 1 <= ball <= len(context.prototype.balls):
+            yield f"row {k} is out of order, or of no ball"
+        if angles.get(stop) != angle:
+            yield f"row {k} is at another angle than its stop"

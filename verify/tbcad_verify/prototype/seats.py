@@ -35,6 +35,7 @@ SUNK_MM = 1e-3
 SEARCH_MM = 2.0  # beyond the ball, in which facets are searched
 MIN_DETERMINANT = 1e-3  # of the pads' normals, for the planes to meet in a point
 LISTED = 3  # balls without three pads
+FILE = ("base",)
 CHECKS = {
     "ball centres": "um",
     "pads": "mm",

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from tbcad_verify.mesh.rays import build_scene, distances_to_planes, first_hits
-from tbcad_verify.mesh.vectors import norm, unit
+from tbcad_verify.mesh.vectors import unit
+from tbcad_verify.prototype.bodies import body_scene, placed_meshes
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_parts import MeasuredPart, joined_meshes
+from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -21,6 +21,7 @@ from tbcad_verify.report.checks import (
 )
 from tbcad_verify.types import Bools, Floats
 
+FILE = ("stage", "frame")
 CHECKS = {
     "object room": "mm^3",
     "leds seen": "LEDs",
@@ -33,13 +34,14 @@ ROOM_SIDES = 180
 
 
 def checks(
-    names: list[CheckName], context: PrototypeContext, fixed: list[MeasuredPart]
+    names: list[CheckName], context: PrototypeContext, parts: list[MeasuredPart]
 ) -> list[Check]:
     """Room and LEDs against the parts of stage and frame.
 
     Every LED is inside the capture sphere.
     """
     room, seen, inside = names
+    fixed = of_roles(parts, *FILE)
     leds = context.prototype.leds
     volume, filled = _volume_in_room(context, fixed)
     empty = at_most(room, volume, ROOM_MM3, f"in the object's room: {short_list(filled)}")
@@ -111,14 +113,8 @@ def _hidden_by_room(context: PrototypeContext) -> Bools:
 
 def _hidden_by_parts(context: PrototypeContext, fixed: list[MeasuredPart]) -> Bools:
     """(l, m) whether a facet of a part is on the way to the mirror; beyond it is no light."""
-    mesh, _ = joined_meshes(fixed)
     apex = context.export.mirrors.take(context.mirror_rows).columns("px", 3)
-    scene, (leds, sight) = build_scene(mesh), _sights(context)
-    hidden = np.zeros((len(leds), sight.shape[2]), dtype=np.bool_)
-    for k, place in enumerate(leds):
-        start, d = np.repeat(place[:, None], sight.shape[2], axis=1), unit(sight[k])
-        facet = first_hits(scene, start, d)
-        hit = np.flatnonzero(facet >= 0)
-        reach = distances_to_planes(scene, facet[hit], start[:, hit], d[:, hit])
-        hidden[k, hit] = reach < norm(apex[:, hit] - place[:, None])
-    return hidden
+    scene, (leds, sight) = body_scene(placed_meshes(fixed)), _sights(context)
+    starts = np.repeat(leds[:, :, None], sight.shape[2], axis=2)
+    reach = [scene.first(*rays)[1] for rays in zip(starts, map(unit, sight), strict=True)]
+    return np.asarray(reach < np.linalg.norm(apex - starts, axis=1))

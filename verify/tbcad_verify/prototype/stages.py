@@ -1,122 +1,120 @@
-"""The stages that verify the prototype. Each is independent, as those of the shell are."""
+"""The stages that verify the prototype. Each is independent, as those of the shell are.
+
+`report/checks.toml` lists the modules of each stage. A module has `CHECKS`, the unit of each check
+by name; `FILE`, what they are about: a file, or roles of parts, whose STL files are meant; and
+`checks`, whose parameters after the names are those findings that it needs, by their names.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
-from types import ModuleType
-from typing import Any, Generic, TypeVar
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from inspect import signature
+from typing import Any
 
-import numpy as np
-
+from tbcad_verify.mesh.mesh import join_meshes
 from tbcad_verify.mesh.rays import in_threads
 from tbcad_verify.mesh.stl import Facets
-from tbcad_verify.prototype import (
-    assembly,
-    bodies,
-    bodies_apart,
-    camera_gauge_checks,
-    camera_mount_checks,
-    caps,
-    cut_checks,
-    drive_checks,
-    fastener_checks,
-    holding_checks,
-    key_access,
-    seats,
-    stage_checks,
-    swing,
+from tbcad_verify.prototype import record_checks
+from tbcad_verify.prototype.assembly import (
+    Shape,
+    all_solids,
+    assembly_meshes,
+    assembly_solids,
+    part_solids,
 )
-from tbcad_verify.prototype import record_checks as records
+from tbcad_verify.prototype.bodies import AssembledBodies, MeasuredPrototype, measure_prototype
+from tbcad_verify.prototype.caps import MeasuredCap, measure_cap
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.control import homing_checks, klipper_checks
-from tbcad_verify.prototype.light import ball_views, lamp_light
-from tbcad_verify.prototype.light.ball_views import BallViews
+from tbcad_verify.prototype.light.ball_views import (
+    BallViews,
+    ball_views,
+    pixel_rays,
+)
 from tbcad_verify.prototype.measured_parts import (
     MeasuredPart,
-    joined_meshes,
     measure_part,
     of_roles,
 )
+from tbcad_verify.prototype.seats import MeasuredSeat, measure_seats
 from tbcad_verify.record.export import Export
-from tbcad_verify.record.prototype import KLIPPER, SETTINGS, Prototype
-from tbcad_verify.record.prototype import RECORD as RECORD_FILE
-from tbcad_verify.report.checks import (
-    Check,
-    attempt,
-    check_names,
-    finite,
-    guarded,
-    require,
-)
+from tbcad_verify.record.prototype import Prototype
+from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
+from tbcad_verify.report.methods import prototype_stages
 from tbcad_verify.run.results import Results, ResultSink
 from tbcad_verify.step.shell_checks import RULE, rule_check
 from tbcad_verify.step.solids_text import TextSolid
 
-STAGES = (
-    "prototype's record",
-    "printed parts",
-    "parts and fits",
-    "seats",
-    "light paths of the balls",
-    "swing",
-    "printability of the prototype",
-)
-RECORD, PARTS, FITS, SEATS, LIGHT, SWING, PRINTING = STAGES
-PLACED = ("base", "cap", "stage", "frame")  # roles of the parts that are in the prototype
+RECORD, PARTS, PRINTING = "prototype's record", "printed parts", "printability of the prototype"
+STAGES = (RECORD, PARTS, *prototype_stages(), PRINTING)
 ZERO_DISC = "zero_disc"  # of the base, beside its carrier
-PATTERNS = "shroud_*.dxf"
-DRAWINGS = "drawing_*.dxf, plate_holes.csv"
-DIGITS = 9
-
-Row = dict[str, Any]
-# Module with checks, or their units by name and what makes them.
-Subject = ModuleType | tuple[Mapping[str, str], Callable[..., list[Check]]]
-Files = str | tuple[str, ...]  # or roles of parts, whose STL files are named
-# Subject, files, and arguments of the checks but names and context; what is worked out `Once` is.
-Job = tuple[Any, ...]
-T = TypeVar("T")
 
 
-class Once(Generic[T]):
-    """A value that is worked out when it is first asked for; why it is not known is kept too."""
+@dataclass(frozen=True)
+class Findings:
+    """What several checks need: fields, and methods whose values are worked out once."""
 
-    def __init__(self, work: Callable[[], T]) -> None:
-        """Take what works the value out."""
-        self.attempt = cache(lambda: attempt(work))
+    context: PrototypeContext  # the record
+    parts: list[MeasuredPart]  # all printed parts
+    _known: dict[str, tuple[Any, str]] = field(default_factory=dict, init=False)
 
-    def __call__(self) -> T:
-        """The value. Unknown: it could not be worked out."""
-        return require(*self.attempt())
+    def __getitem__(self, name: str) -> Any:
+        """A finding by its name. Unknown: it could not be worked out."""
+        if name not in self._known:
+            value = getattr(self, name)
+            self._known[name] = attempt(value) if callable(value) else (value, "")
+        return require(*self._known[name])
 
+    def drawn(self) -> dict[str, Shape]:
+        """Shapes of the GLB's bodies, by name."""
+        return assembly_meshes(self.context)
 
-class _Findings:
-    """What several checks need."""
+    def solids(self) -> dict[str, TextSolid]:
+        """Solids of the STEP assembly, by name."""
+        return assembly_solids(self.context)
 
-    def __init__(self, context: PrototypeContext, parts: list[MeasuredPart]) -> None:
-        self.context, self.parts = context, parts
-        base, caps_ = (of_roles(parts, role) for role in ("base", "cap"))
-        self.drawn = Once(lambda: assembly.assembly_meshes(context))
-        self.solids = Once(lambda: assembly.assembly_solids(context))
-        self.own = Once(lambda: assembly.part_solids(context))
-        self.seats = Once(lambda: seats.measure_seats(context, joined_meshes(base)[0]))
-        self.caps = Once(lambda: [caps.measure_cap(context, part) for part in caps_])
-        self.measured = Once(
-            lambda: bodies.measure_prototype(
-                context, self.seats(), self.caps(), parts, self.drawn()
-            )
-        )
-        self.views = Once(lambda: _views(self.measured()))
-        self.bodies = Once(lambda: bodies.AssembledBodies(context, self.drawn()))
+    def own(self) -> dict[str, TextSolid]:
+        """Solids of the parts' own STEP files, by name."""
+        return part_solids(self.context)
 
-    def own_of(self, role: str) -> list[TextSolid]:
-        """Solids of the parts of a role."""
-        some = [part for part in self.context.prototype.parts if part.role == role]
-        return [self.own()[part.name] for part in some if part.name != ZERO_DISC]
+    def carriers(self) -> list[TextSolid]:
+        """Solids of the carrier's parts, of the zero disc beside it none."""
+        return self._own_of("base", without=ZERO_DISC)
 
+    def cap_solids(self) -> list[TextSolid]:
+        """Solids of the caps, in the order of their balls."""
+        return self._own_of("cap")
 
-def _views(measured: bodies.MeasuredPrototype) -> BallViews:
-    return ball_views.ball_views(measured, ball_views.pixel_rays(measured))
+    def _own_of(self, role: str, without: str = "") -> list[TextSolid]:
+        some = [part.name for part in self.context.prototype.parts if part.role == role]
+        return [self["own"][name] for name in some if name != without]
+
+    def closed(self) -> dict[str, Any]:
+        """All bodies of the assembly as manifold3d has them, by name."""
+        return all_solids(self.parts, self["drawn"])
+
+    def seats(self) -> list[MeasuredSeat]:
+        """Where the pads put the balls."""
+        base = join_meshes([part.placed_mesh for part in of_roles(self.parts, "base")])
+        return measure_seats(self.context, base)
+
+    def caps(self) -> list[MeasuredCap]:
+        """Spheres of the caps."""
+        return [measure_cap(self.context, part) for part in of_roles(self.parts, "cap")]
+
+    def measured(self) -> MeasuredPrototype:
+        """Balls on their pads, and what may be in their light."""
+        given = self["seats"], self["caps"], self.parts, self["drawn"]
+        return measure_prototype(self.context, *given)
+
+    def views(self) -> BallViews:
+        """What each mirror's ball shows."""
+        return ball_views(self["measured"], pixel_rays(self["measured"]))
+
+    def bodies(self) -> AssembledBodies:
+        """The GLB's bodies, for rays."""
+        return AssembledBodies(self.context, self["drawn"])
 
 
 def verify_prototype(
@@ -129,7 +127,7 @@ def verify_prototype(
     """
     context = PrototypeContext(export, prototype)
     sink(Results(stages=[RECORD]))
-    sink(Results(checks=records.checks(context)))
+    sink(Results(checks=record_checks.checks(context)))
     if not export.parts:  # else the shell's STEP files bring this check
         sink(Results(checks=guarded([RULE], lambda: [rule_check(export)])))
     sink(Results(stages=[PARTS]))
@@ -138,108 +136,25 @@ def verify_prototype(
     for part in parts:
         masses = {} if part.placed_mass is None else {part.part.name: part.placed_mass}
         sink(Results(checks=part.checks, masses=masses))
-    found = _Findings(context, parts)
-    for stage, jobs in ((FITS, _fits), (SEATS, _seats), (LIGHT, _light), (SWING, _swing)):
+    found = Findings(context, parts)
+    for stage, modules in prototype_stages().items():
         sink(Results(stages=[stage]))
-        for job in jobs(found):
-            sink(Results(checks=_done(found, *job)))
-    sink(Results(prototype=json_rows(found)))
+        for module in modules:
+            sink(Results(checks=checks_of(module, found)))
     return parts
 
 
-def _done(found: _Findings, subject: Subject, files: Files, *arguments: object) -> list[Check]:
-    """The checks of a job; all are unknown if they or their arguments break."""
-    units, checks = subject if isinstance(subject, tuple) else (subject.CHECKS, subject.checks)
-    if not isinstance(files, str):
-        files = ", ".join(part.part.stl for part in of_roles(found.parts, *files))
-    names = check_names(units, files)
+def checks_of(name: str, found: Findings) -> list[Check]:
+    """The checks of a module, by its name; all are unknown if they or what they need break."""
+    module = import_module(f"tbcad_verify.prototype.{name}")
+    file = module.FILE
+    if not isinstance(file, str):
+        file = ", ".join(part.part.stl for part in of_roles(found.parts, *file))
+    names = check_names(module.CHECKS, file)
 
     def work() -> list[Check]:
-        values = [one() if isinstance(one, Once) else one for one in arguments]
-        made: list[Check] = checks(names, found.context, *values)
+        needed = list(signature(module.checks).parameters)[1:]
+        made: list[Check] = module.checks(names, *(found[one] for one in needed))
         return made
 
     return guarded(names, work)
-
-
-def _fits(found: _Findings) -> Iterator[Job]:
-    """What there is, in all files that list it, and what follows from it."""
-    solids, parts = found.solids, found.parts
-    held = Once(lambda: found.own_of("base")), Once(lambda: found.own_of("cap"))
-    yield assembly, RECORD_FILE, found.drawn, solids, found.own
-    yield fastener_checks, RECORD_FILE, solids
-    yield key_access, RECORD_FILE, found.drawn
-    yield homing_checks, SETTINGS, solids
-    yield cut_checks, DRAWINGS, solids
-    yield klipper_checks, KLIPPER, solids
-    yield holding_checks, RECORD_FILE, *held
-    if found.context.prototype.balls.cap.any():
-        yield (holding_checks.TILT, holding_checks.tilt_checks), RECORD_FILE, *held
-    yield camera_mount_checks, RECORD_FILE, solids
-    yield camera_gauge_checks, RECORD_FILE, parts
-    yield drive_checks, RECORD_FILE, parts, solids
-
-
-def _seats(found: _Findings) -> Iterator[Job]:
-    yield seats, ("base",), found.seats
-    if found.context.prototype.balls.cap.any():
-        yield caps, ("cap",), found.caps
-
-
-def _light(found: _Findings) -> Iterator[Job]:
-    yield ball_views, PLACED, found.views
-
-
-def _swing(found: _Findings) -> Iterator[Job]:
-    context, parts, drawn = found.context, found.parts, found.drawn
-    file, fixed = context.prototype.assembly.glb, ("stage", "frame")
-    solids = Once(lambda: assembly.all_solids(parts, drawn()))
-    yield swing, PLACED, found.measured, solids
-    yield bodies_apart, file, solids, drawn
-    yield (lamp_light.DARK, lamp_light.dark_checks), file, found.bodies
-    yield (cut_checks.SHROUD, cut_checks.shroud_checks), PATTERNS, drawn, found.solids
-    yield lamp_light, file, found.bodies, found.solids
-    yield stage_checks, fixed, of_roles(parts, *fixed)
-
-
-def json_rows(found: _Findings) -> Row:
-    """Ball by ball and stop by stop, as verify.json has it; what is not known is null."""
-    context, (held, _), (views, _) = found.context, found.seats.attempt(), found.views.attempt()
-    balls = context.prototype.balls
-    count = len(balls)
-    error = minimum = pixels = shell = np.full(count, np.nan)
-    if held is not None:
-        error = seats.centre_errors(context, held)
-    stops = []
-    if views is not None:
-        minimum = ball_views.ball_coverage(context, views.coverage)
-        pixels = np.round(np.bincount(context.ball, views.pixels, count))
-        shell = np.bincount(context.ball, views.pixels_shell, count)
-        stop = context.prototype.plan.stop[context.plan_rows]
-        stops = [
-            {
-                "stop": number,
-                "base_angle_deg": _rounded(np.degrees(context.angle[stop == number][0])),
-                "mirrors": int((stop == number).sum()),
-                "coverage_mm": _rounded(views.coverage[stop == number].min()),
-                "blocked": int(views.blocked[stop == number].sum()),
-            }
-            for number in np.unique(stop).tolist()
-        ]
-    rows = [
-        {
-            "number": k + 1,
-            "kind": "cap" if balls.cap[k] else "ball",
-            "centre_error_um": _rounded(error[k]),
-            "coverage_mm": _rounded(minimum[k]),
-            "pixels": _rounded(pixels[k]),
-            "pixels_shell": _rounded(shell[k]),
-        }
-        for k in range(count)
-    ]
-    return {"balls": rows, "stops": stops}
-
-
-def _rounded(value: float) -> float | None:
-    known = finite(float(value))
-    return None if known is None else round(known, DIGITS)

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from tbcad_verify.prototype.bodies import MeasuredPrototype, turning
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.measured_parts import PLACED
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -32,6 +33,7 @@ BETWEEN_MM = 2 * GRAIN_MM / float(np.sqrt(3))
 CLEAR_MM = 1.0  # a distance about the axis for which one sample is enough
 GROWTH = 1.5  # of a distance from one sample to the next, mostly at most
 MIN_LEVER_MM = 1e-9
+FILE = PLACED
 CHECKS = {"swing": "mm^3", "swing clearance": "mm"}
 
 SUNK = ("INSERT-", "DOWEL-", "MAGNET-", "LED-")  # fasteners that stand out of nothing
@@ -121,12 +123,12 @@ def checks(
     names: list[CheckName],
     context: PrototypeContext,
     measured: MeasuredPrototype,
-    solids: Mapping[str, Any],
+    closed: Mapping[str, Any],
 ) -> list[Check]:
     """Rotate the base from end to end of its swing."""
     swing, clearance = names
     moving, still = (
-        [axial_solid(measured, *one) for one in group] for group in _groups(measured, solids)
+        [axial_solid(measured, *one) for one in group] for group in _groups(measured, closed)
     )
     sweeps = [sweep(measured, one, two) for one in moving for two in still]
     volume = max((one.volume for one in sweeps), default=0.0)

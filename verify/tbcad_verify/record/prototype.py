@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Literal, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
@@ -23,7 +23,6 @@ from tbcad_verify.record.prototype_sections import (
     CameraPlace,
     CapDrawing,
     Drawing,
-    Frame,
     Home,
     Lamps,
     Led,
@@ -45,7 +44,7 @@ from tbcad_verify.record.validation import (
 )
 
 SCHEMA = "tbcad-prototype/2"
-RECORD = "prototype.json"
+RECORD, GLB = "prototype.json", "prototype.glb"
 PLATE_HOLES = "plate_holes.csv"
 BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"
 SETTINGS = "grbl_settings.txt"
@@ -57,10 +56,6 @@ class Prototype(Strict):
     """The whole record."""
 
     camera: Name  # id of the camera that it serves
-    target_mm: float = Field(ge=1e-3, le=1e6)  # coverage diameter that is required
-    # whether pictures are moved along with their balls when they are merged
-    picture: Literal["moved", "fixed"]
-    frame: Frame  # of the base
     # smallest and largest base angle driven, degrees
     swing: list[Angle] = Field(alias="swing_deg", min_length=2, max_length=2)
     seats: list[Seat] = Field(max_length=MOST)  # one for each ball
@@ -114,11 +109,6 @@ class Prototype(Strict):
         drawings = [name for one in self.drawn for name in (one.dxf, one.pdf)]
         panels = [one.dxf for one in self.shroud.panels] if self.shroud else []
         return frozenset({*self.digests, *drawings, *panels, self.assembly.step, self.assembly.glb})
-
-    @property
-    def moved(self) -> bool:
-        """Whether pictures are moved along with their balls when they are merged."""
-        return self.picture == "moved"
 
 
 def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:

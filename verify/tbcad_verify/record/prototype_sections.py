@@ -58,8 +58,6 @@ class Balls(Columns):
     bx: Numbers
     by: Numbers
     bz: Numbers
-    coverage_mm: Numbers
-    coverage_fixed_mm: Numbers
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -108,19 +106,6 @@ class Stops(Columns):
     angle: Angles = Field(alias="base_angle_deg")
 
 
-class Frame(Strict):
-    """Axis of the base, azimuth zero, and the third axis."""
-
-    axis: Vector
-    zero: Vector
-    third: Vector
-
-    @property
-    def rows(self) -> Floats:
-        """All three, (3, 3)."""
-        return np.stack([self.axis, self.zero, self.third])
-
-
 class Seat(Strict):
     """The seat of a ball as recorded: where to begin looking for its pads."""
 
@@ -150,11 +135,10 @@ class PrintedPart(PartFiles):
 
 
 class Led(Strict):
-    """A light-emitting diode of the stage: its position (3,) mm and direction (3,)."""
+    """A light-emitting diode of the stage: its position (3,) mm."""
 
     name: Name
     position: Vector = Field(alias="position_mm")
-    direction: Vector
 
 
 class PurchasedBody(Strict):
@@ -198,7 +182,6 @@ class Shroud(Strict):
     """The box round the rig."""
 
     sheet: str = Field(max_length=WIDEST)
-    sheets: int = Field(ge=1, le=MOST)
     finish: str = Field(max_length=WIDEST)
     panels: list[Panel] = Field(min_length=1, max_length=MOST)
 
@@ -221,7 +204,6 @@ class PlacedFastener(Strict):
 class AssemblyStep(Strict):
     """A step of assembly."""
 
-    key: Name  # its name
     mounts: list[Name] = Field(max_length=MOST)  # names of the bodies and fasteners that it mounts
 
 
@@ -265,7 +247,6 @@ class MarkPicture(Strict):
 class CameraPlace(Strict):
     """How the camera is put in its place."""
 
-    gauge: Name  # name of its part
     # near and far mark of either side, at base angle zero, (2, 2, 3) mm
     marks: list[list[Vector]] = Field(alias="marks_mm")
     pictures: list[MarkPicture] = Field(min_length=1, max_length=99)  # of the marks

@@ -109,6 +109,8 @@ class BaseSpec(Strict):
 
     pad_offset_mm: float = Field(ge=-0.05, le=0.3)
     hold: Annotated[Literal["magnet", "glue"], OR_AUTO]
+    clearance_mm: float = Field(ge=0.1, le=5)
+    cap_play_mm: float = Field(ge=0.02, le=0.5)
     magnet_gap_mm: float = Field(ge=0.1, le=5)
     magnet_play_mm: float = Field(ge=0, le=1)
     drive: Literal["nema17-belt", "nema17-direct", "stage-60"]
@@ -136,12 +138,18 @@ class MotionSpec(Strict):
     safety: float = Field(ge=1, le=10)
 
 
+Place = Annotated[
+    list[Annotated[float, Field(ge=-1000, le=1000)]], Field(min_length=3, max_length=3)
+]
+
+
 class StageSpec(Strict):
     """The stage that carries the object, with LEDs at known places for calibration."""
 
     top_mm: Annotated[float, Field(ge=-1000, le=1000), OR_AUTO]
     object_diameter_mm: Annotated[float, Field(ge=1, le=1000), OR_AUTO]
     led: Literal["LED-3", "LED-5"]
+    leds_mm: Annotated[list[Place], OR_AUTO]
 
 
 class LightSpec(Strict):
@@ -158,6 +166,8 @@ class FrameSpec(Strict):
     """The brackets of the camera."""
 
     flange_mm: float = Field(ge=3, le=30)
+    bearing_fit_mm: float = Field(ge=-0.5, le=0.5)
+    post_play_mm: float = Field(ge=0, le=2)
     camera_screw_mm: float = Field(ge=10, le=1000)
     camera_travel_mm: float = Field(ge=0, le=200)
 
@@ -169,6 +179,7 @@ class PrototypeSpec(Strict):
     picture: Literal["moved", "fixed"]
     caps: bool
     max_swing_deg: float = Field(gt=0, le=360)
+    ball_wall_mm: Annotated[float, Field(ge=0, le=50), OR_AUTO]
     largest_ball_mm: Annotated[float, Field(gt=0, le=1000), OR_AUTO]
     camera_diameter_mm: Annotated[float, Field(ge=0, le=500), OR_AUTO]
     camera_length_mm: float = Field(ge=0, le=1000)

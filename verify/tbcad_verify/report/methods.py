@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tbcad_verify.report.checks import Check
@@ -38,9 +38,20 @@ class Method:
 
 
 @cache
+def _table() -> dict[str, Any]:
+    text = (files("tbcad_verify.report") / "checks.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def prototype_stages() -> dict[str, list[str]]:
+    """Modules of the prototype's checks by the title of their stage, in order."""
+    found: dict[str, list[str]] = _table()["prototype"]
+    return found
+
+
+@cache
 def methods() -> tuple[Method, ...]:
     """All methods, in the order of checks.toml."""
-    text = (files("tbcad_verify.report") / "checks.toml").read_text(encoding="utf-8")
     return tuple(
         Method(
             row["title"],
@@ -50,7 +61,7 @@ def methods() -> tuple[Method, ...]:
             row["tolerance"],
             tuple(row.get("remedies") or [row["remedy"]] * len(row["names"])),
         )
-        for row in tomllib.loads(text)["check"]
+        for row in _table()["check"]
     )
 
 

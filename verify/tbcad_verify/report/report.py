@@ -51,7 +51,7 @@ class Report:
         printing: a row for each part on each printer.
         shell: whether there is a shell; without one, the mirrors are requirements only.
         valleys: whether its mirrors meet in valleys, which solids have without a cutter's fillets.
-        prototype: what is known of each ball and stop; None without a prototype.
+        balls: number of the prototype's balls; 0 without a prototype.
         note: what the build says of itself, such as why a part was left out; "" for nothing.
         folder: where the export lies.
         seconds: what the command took.
@@ -66,7 +66,7 @@ class Report:
     printing: tuple[dict[str, Any], ...] = ()
     shell: bool = True
     valleys: bool = False
-    prototype: Mapping[str, Any] | None = None
+    balls: int = 0
     note: str = ""
     folder: Path | None = None
     seconds: float | None = None
@@ -103,8 +103,6 @@ class Report:
             "printing": list(self.printing),
             "mirrors": _mirror_rows(self),
         }
-        if self.prototype is not None:
-            document["prototype"] = self.prototype
         if self.programs:
             document["programs"] = [_check_row(check) for check in self.programs]
         return json.dumps(document, indent=1, allow_nan=False) + "\n"
@@ -190,11 +188,11 @@ def _rounded(value: float | None) -> float | int | None:
 
 
 def _pass_line(report: Report) -> str:
-    sees, balls = f"{report.target_mm:g} mm or more", report.prototype and report.prototype["balls"]
+    sees = f"{report.target_mm:g} mm or more"
     if not report.shell:
-        return f"PASS: as designed, every mirror sees {sees} on {len(balls or ())} balls; no shell"
+        return f"PASS: as designed, every mirror sees {sees} on {report.balls} balls; no shell"
     count = virtual_cameras(report.mirrors).count
-    too = f", on {len(balls)} balls too" if balls else ""
+    too = f", on {report.balls} balls too" if report.balls else ""
     return f"PASS: as designed, {count} virtual cameras see {sees}{too}"
 
 

@@ -33,8 +33,6 @@ class Results:
     # mass properties of each part's mesh, by the part's name
     masses: dict[str, MassProperties] = field(default_factory=dict)
     printing: list[Row] = field(default_factory=list)  # a row for each part on each printer
-    # what is known of each ball and stop; None if there is no prototype
-    prototype: Row | None = None
 
 
 ResultSink: TypeAlias = Callable[[Results], None]
@@ -54,6 +52,5 @@ class CollectedResults(Results):
         self.mirrors |= results.mirrors
         self.masses |= results.masses
         self.printing += results.printing
-        self.prototype = results.prototype or self.prototype
         for title in results.stages:
             self.progress(title)

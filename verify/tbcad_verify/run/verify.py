@@ -99,7 +99,7 @@ def verify(
         tuple(results.printing),
         shell=bool(export.parts),
         valleys=export.spec.shell.edges == "valley" and bool(export.parts),
-        prototype=results.prototype,
+        balls=len(export.prototype.balls) if export.prototype else 0,
         folder=folder,
         seconds=time.monotonic() - started,
     )

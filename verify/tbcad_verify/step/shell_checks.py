@@ -171,9 +171,12 @@ def _traced(export: Export) -> Bools:
     mirrors, largest = export.mirrors, _largest(export)
     margin = _margins(export)
     beyond = mirrors.coverage_mm - (export.target_mm + margin)
-    # Where spheres of the largest radius would not meet, tbcad makes them flatter still.
-    at_largest = mirrors.radius_mm >= largest * (1 - RULE_SHARE)
-    good = (np.abs(beyond) <= RULE_MM) | (at_largest & (beyond >= -RULE_MM))
+    # Where spheres of the largest radius would not meet, tbcad halves the least curvature of all.
+    flatter = mirrors.radius_mm / largest
+    halvings = np.log2(np.max(flatter, initial=1.0))
+    good = (np.abs(beyond) <= RULE_MM) | ((flatter >= 1 - RULE_SHARE) & (beyond >= -RULE_MM))
+    if abs(halvings - np.round(halvings)) > RULE_SHARE:
+        good &= flatter <= 1 + RULE_SHARE
     return np.asarray(good & (margin >= export.spec.mirrors.margin_mm))
 
 

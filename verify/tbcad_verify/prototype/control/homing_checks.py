@@ -16,6 +16,7 @@ from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control.gcode_checks import PULL_OFF_DEG, homing
 from tbcad_verify.prototype.control.gcode_machine import run_program
 from tbcad_verify.prototype.drive_checks import FULL_STEPS, gear_of
+from tbcad_verify.record.prototype import SETTINGS
 from tbcad_verify.report.checks import Check, CheckName, Unknown, no_faults, require
 from tbcad_verify.step.solids_text import TextSolid, distance_to_line, holes
 from tbcad_verify.types import Floats
@@ -55,6 +56,7 @@ MAX_SEEK_DEG_MIN = 720.0
 XYZ = 0b111
 MAX_BEYOND_DEG = 4.0  # of soft limits beyond the program
 AXES = "XYZA"
+FILE = SETTINGS
 CHECKS = {"homing": "faults", "controller settings": "faults"}
 
 

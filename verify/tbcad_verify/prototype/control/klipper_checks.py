@@ -63,6 +63,7 @@ CONFIG = (
 )
 FIGURE_SHARE = 1e-5
 SAME_DEG = 2.1e-4
+FILE = KLIPPER
 CHECKS = {"klipper": "faults"}
 
 

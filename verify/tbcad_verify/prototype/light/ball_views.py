@@ -29,6 +29,7 @@ from tbcad_verify.prototype.light.ray_paths import (
     ray_transfer,
     rotated,
 )
+from tbcad_verify.prototype.measured_parts import PLACED
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -40,10 +41,10 @@ from tbcad_verify.report.checks import (
 )
 from tbcad_verify.types import Bools, Floats, Ints
 
+FILE = PLACED
 CHECKS = {
     "cells": "directions",
     "coverage, balls": "mm",
-    "coverage, balls, deviation from record": "mm",
     "light paths, balls": "blocked rays",
     "rays, balls": "rays",
     "pixels, balls": "% of the shell's",
@@ -99,30 +100,19 @@ def ball_views(measured: MeasuredPrototype, pixel: PixelRays) -> BallViews:
 
 def checks(names: list[CheckName], context: PrototypeContext, views: BallViews) -> list[Check]:
     """Every mirror's ball shows the whole object at its stop, and nothing obstructs the light."""
-    cells, covers, off_record, light, rays, pixels = names
+    cells, covers, light, rays, pixels = names
     ids, target = context.mirror_ids, context.export.target_mm
     hidden, blocked, coverage = views.hidden, views.blocked, views.coverage
     small = worst_offenders(ids, coverage, "mm", coverage < target, badness=-coverage)
-    balls, minimum = context.prototype.balls, ball_coverage(context, coverage)
-    recorded = balls.coverage_mm if context.moved else balls.coverage_fixed_mm
-    error = np.where(np.isfinite(minimum), np.abs(minimum - recorded), 0)
-    k, seen, of = int(error.argmax()), views.pixels.sum(), views.pixels_shell.sum()
+    seen, of = views.pixels.sum(), views.pixels_shell.sum()
     by, share = short_list(views.blockers), 100 * float(seen / max(of, 1))
     return [
         at_most(cells, hidden.sum(), 0, f"another mirror covers {_ray_counts(ids, hidden)}"),
         at_least(covers, float(coverage.min()), target, f"shows too little: {small}"),
-        informative(off_record, float(error[k]), f"ball {k + 1} shows {minimum[k]:.3f}"),
         at_most(light, blocked.sum(), 0, f"{_ray_counts(ids, blocked)}; blocked by {by}"),
         informative(rays, float(views.rays.sum()), "traced, before and after the ball"),
         informative(pixels, share, f"{seen:.0f} of {of:.0f} px, from a sample"),
     ]
-
-
-def ball_coverage(context: PrototypeContext, coverage: Floats) -> Floats:
-    """(K,) minimum coverage of the mirrors that each ball substitutes for; inf without any."""
-    minimum = np.full(len(context.prototype.balls), np.inf)
-    np.minimum.at(minimum, context.ball, coverage)
-    return minimum
 
 
 def _ray_counts(ids: list[str], counts: Ints) -> str:

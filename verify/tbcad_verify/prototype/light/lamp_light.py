@@ -1,4 +1,4 @@
-"""The lamps' light on the object, the base in the way at its stops; and a background in the dark.
+"""The lamps' light on the object, the base in the way at its stops.
 
 Each face is Lambertian and is cut into tiles. The object's room is sampled by points on its wall
 and axis, each with surfaces that face all ways. Compared is what falls on a surface of the object
@@ -11,15 +11,15 @@ Lamps that light the object alike before and after its half turn cannot be anywh
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from tbcad_verify.mesh.vectors import unit
-from tbcad_verify.prototype.bodies import OWN, AssembledBodies, Bodies, some_angles, stage_bodies
+from tbcad_verify.prototype.bodies import AssembledBodies, Bodies, some_angles, stage_bodies
 from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.record.prototype import GLB
 from tbcad_verify.record.prototype_sections import Lamps
 from tbcad_verify.report.checks import (
     Check,
@@ -28,7 +28,6 @@ from tbcad_verify.report.checks import (
     at_most,
     informative,
     no_faults,
-    short_list,
 )
 from tbcad_verify.step.solids_text import TextSolid
 from tbcad_verify.types import Bools, Floats
@@ -45,6 +44,7 @@ PLACE_MM = 1e-6
 FACET_MM = 0.1  # by which facets of the assembly may be off the faces that they stand for
 PAIR_MM = 1e-3  # between an LED and the image of another
 HALF_TURN = np.array([-1.0, -1.0, 1.0])
+FILE = GLB
 CHECKS = {
     "lamps": "faults",
     "light before and after": "%",
@@ -52,17 +52,12 @@ CHECKS = {
     "light of the lamps": "lx",
     "light from above": "% of upright surfaces'",
 }
-DARK = {"dark background": "rays"}
-GRID = 160  # rays across the columns of the picture
-BLACK = "matt black"
-NOTHING = "nothing"
-MIRRORS = ("ball_", "cap_")
 
 
 def checks(
     names: list[CheckName],
     context: PrototypeContext,
-    assembly: AssembledBodies,
+    bodies: AssembledBodies,
     solids: Mapping[str, TextSolid],
 ) -> list[Check]:
     """The lamps are as drawn, and light the object alike before and after its turn."""
@@ -75,11 +70,11 @@ def checks(
     if lamps.strip not in STRIPS:
         raise Unknown(f"{lamps.strip} is no strip that is known")
     own = {lamp.name for lamp in lamps.places}
-    bodies = assembly.without(stage_bodies(context) | own)
+    in_the_way = bodies.without(stage_bodies(context) | own)
     points, normals = _surfaces(context)
     fields = np.stack(
         [
-            irradiance(lamps, points * turn, normals * turn, bodies, angle)
+            irradiance(lamps, points * turn, normals * turn, in_the_way, angle)
             for angle in some_angles(context).tolist()
             for turn in (np.ones(3), HALF_TURN)
         ]
@@ -89,7 +84,7 @@ def checks(
     change = 100 * float(((greatest - least)[lit] / greatest[lit]).max())
     tilt = np.degrees(np.arcsin(normals[:, 2]))
     upright, upward = (float(fields[:, np.abs(tilt - of) < 1].mean()) for of in (0.0, UPWARD_DEG))
-    shadowed = _shadowed(context, lamps, assembly.without(own), points, normals)
+    shadowed = _shadowed(context, lamps, bodies.without(own), points, normals)
     facing = f"on surfaces that face {UPWARD_DEG:g} deg upward"
     return [
         no_faults(listed, _faults(lamps, solids)),
@@ -223,43 +218,3 @@ def _tiles(lamps: Lamps, position: Floats, direction: Floats) -> Iterator[Floats
     for i, j in np.ndindex(TILES):
         x, z = ((i + 0.5) / TILES[0] - 0.5) * wide, ((j + 0.5) / TILES[1] - 0.5) * high
         yield position + x * across + z * up
-
-
-def dark_checks(
-    names: list[CheckName], context: PrototypeContext, assembly: AssembledBodies
-) -> list[Check]:
-    """Rays of the whole sensor, at some stops: what they meet is a mirror or listed as black."""
-    if context.prototype.shroud is None:
-        return [informative(names[0], 0, "there is no shroud")]
-    black, rays = _black_bodies(context), _sensor_rays(context)
-    origin, bodies = np.broadcast_to(context.pinhole, rays.shape), assembly.without(OWN)
-    seen = Counter[str]()
-    for angle in some_angles(context).tolist():
-        for name, count in bodies.count_first(origin, rays, angle).items():
-            if name not in black and not name.startswith(MIRRORS):
-                seen[name or NOTHING] += count
-    texts = [f"{count} rays end on {name}" for name, count in sorted(seen.items())]
-    return [at_most(names[0], seen.total(), 0, short_list(texts))]
-
-
-def _black_bodies(context: PrototypeContext) -> set[str]:
-    """Names of all bodies that the record lists as matt black."""
-    record = context.prototype
-    listed = {part.name for part in record.parts if part.finish == BLACK}
-    listed |= {one.name for one in record.bought if one.finish == BLACK}
-    listed |= {one.name for one in record.fasteners if one.finish == BLACK}
-    if record.shroud and record.shroud.finish == BLACK:
-        listed |= {panel.name for panel in record.shroud.panels}
-    return listed
-
-
-def _sensor_rays(context: PrototypeContext) -> Floats:
-    """(N, 3) unit directions through evenly spaced places of the sensor, its edges included."""
-    camera = context.camera
-    half = np.tan(camera.hfov / 2)
-    across = np.linspace(-half, half, GRID)
-    ratio = camera.height / camera.width
-    down = np.linspace(-half, half, max(2, round(GRID * ratio))) * ratio
-    x, y = np.meshgrid(across, down)
-    rays = camera.forward + x[..., None] * camera.right + y[..., None] * camera.down
-    return np.ascontiguousarray(unit(rays.reshape(-1, 3).T).T)

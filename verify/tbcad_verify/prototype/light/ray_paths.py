@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad_verify.mesh.rays import RAYS_A_CHUNK, distances_to_planes, first_hits, in_threads
+from tbcad_verify.mesh.rays import RAYS_A_CHUNK, in_threads
 from tbcad_verify.mesh.surfaces import ReflectedRays, nearest_on_rays, reflect
 from tbcad_verify.mesh.vectors import (
     chunks,
@@ -19,7 +19,7 @@ from tbcad_verify.mesh.vectors import (
     polar_and_azimuth,
     unit,
 )
-from tbcad_verify.prototype.bodies import MeasuredPrototype, Obstacles
+from tbcad_verify.prototype.bodies import BodyScene, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.types import Bools, Floats, Ints
 
@@ -160,14 +160,9 @@ def _meets(centre: Floats, radius: float, origin: Floats, along: Floats, length:
     return np.asarray((rest < radius**2) & (first < length) & (b < 0))
 
 
-def _part_hits(obstacles: Obstacles, origin: Floats, along: Floats, length: Floats) -> Hits:
+def _part_hits(obstacles: BodyScene, origin: Floats, along: Floats, length: Floats) -> Hits:
     """Rays that meet parts within a length, part by part."""
-    if obstacles.scene is None:
-        return
-    facet = first_hits(obstacles.scene, origin, along)
-    hit = np.flatnonzero(facet >= 0)
-    distance = np.full(facet.size, np.inf)
-    distance[hit] = distances_to_planes(obstacles.scene, facet[hit], origin[:, hit], along[:, hit])
+    body, distance = obstacles.first(origin, along)
     near = distance < length
-    for k in np.unique(obstacles.owner[facet[near]]).tolist():
-        yield near & (obstacles.owner[facet] == k), obstacles.names[k]
+    for k in np.unique(body[near]).tolist():
+        yield near & (body == k), obstacles.names[k]
