@@ -83,8 +83,8 @@ def test_a_good_prototype_passes(prototype_folder: Path) -> None:
 
 
 def test_verification_in_another_process_is_the_same(prototype_folder: Path) -> None:
-    here = verify(prototype_folder, options=replace(IN_PROCESS, write=False))
-    apart = verify(prototype_folder, options=replace(IN_PROCESS, write=False, apart=True))
+    here = judged(verify(prototype_folder, options=replace(IN_PROCESS, write=False)))
+    apart = judged(verify(prototype_folder, options=replace(IN_PROCESS, write=False, apart=True)))
     assert apart.to_json() == here.to_json()
 
 
