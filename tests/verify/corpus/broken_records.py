@@ -284,8 +284,8 @@ RECORDS: tuple[Mutation, ...] = (
         ("another radius rule", spec("mirrors", radius_rule="paper"), "radius rule", "by rule"),
         ("a mesh error", spec("mesh", structure_error_mm=5.0), "requirements", "mesh error"),
         ("a part forgotten", design(lambda one: one["parts"].pop()), "mirrors found", "b0001"),
-        ("no STEP", without("step"), "manifest", "shell_a.step"),
-        ("no 3MF", without("3mf"), "manifest", "shell_a.3mf"),
+        ("no STEP", without("step"), "part files", "shell_a has none"),
+        ("no 3MF", without("3mf"), "part files", "shell_a has none"),
         ("a part for the other camera", part(camera="b"), "mirrors found", "missing"),
     ),
     *failing(

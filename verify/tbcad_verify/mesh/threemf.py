@@ -33,13 +33,15 @@ SCHEMAS = "http://schemas.microsoft.com/3dmanufacturing"
 UUID = r' p:UUID="[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}"'
 # Names of extensions that the library knows; without `requiredextensions` they ask for nothing.
 EXTENSIONS = r'(?: xmlns:[a-z]{1,2}="http://schemas\.[\w./]+")*'
+MILLIMETRES = 'unit="millimeter" xml:lang="en-US"'
 PACKAGE = r"http://schemas\.openxmlformats\.org/package/2006/[\w-]+"
 FORMS = {
     MODEL: (
-        *(XML, rf'<model xmlns="{SCHEMAS}/core/2015/02" unit="millimeter" xml:lang="en-US"{EXTENSIONS}>'),
+        *(XML, rf'<model xmlns="{SCHEMAS}/core/2015/02" {MILLIMETRES}{EXTENSIONS}>'),
         *("<resources>", rf'<object id="1" name="NAME" type="model"{UUID}>', "<mesh>"),
         *("<vertices>", "</vertices>", "<triangles>", "</triangles>", "</mesh>", "</object>"),
-        *("</resources>", f"<build{UUID}>", f'<item objectid="1"{UUID} ?/>', "</build>", "</model>"),
+        *("</resources>", f"<build{UUID}>", f'<item objectid="1"{UUID} ?/>'),
+        *("</build>", "</model>"),
     ),
     TYPES: (
         *(XML, f'<Types xmlns="{PACKAGE}">'),
@@ -79,7 +81,7 @@ def read_3mf(folder: Path, name: str) -> tuple[NDArray[np.float32], FileBytes]:
             _figures(texts[MODEL][slice(*lists[key])], key, digits)
             for key, digits in (("vertices", DIGITS + b"-."), ("triangles", DIGITS))
         )
-        if not 0 < corners.size or corners.max() >= len(points):
+        if not corners.size or corners.max() >= len(points):
             raise ValueError("a triangle without vertices, or none")
     except ValueError as error:
         raise BadExport(f"{blob.name}: {PLACE}: {error}; {AGAIN}") from error

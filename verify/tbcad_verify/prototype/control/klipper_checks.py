@@ -135,7 +135,7 @@ def config_faults(context: PrototypeContext, ratio: float) -> Iterator[str]:
     pins = re.findall(rf"pins?: \^?({PIN})$", text, re.MULTILINE)
     for pin, count in Counter(pins).items():
         if count > 1 and pin != OPEN:
-            yield f"{KLIPPER_CONFIG}: pin {pin} is there {count} times, allowed is one purpose a pin"
+            yield f"{KLIPPER_CONFIG}: pin {pin} is there {count} times, each is for one purpose"
 
 
 def _steps(context: PrototypeContext, ratio: float) -> Iterator[tuple[str, float]]:
