@@ -509,8 +509,8 @@ UNSURE: Broken = {
                 ("centimetres", r"\.MILLI\.,\.METRE", ".CENTI.,.METRE", "MILLI"),
                 ("thousandths of a radian", r"\$,\.RADIAN", ".MILLI.,.RADIAN", "RADIAN"),
                 ("another product", r"PRODUCT\('plate'", "PRODUCT('steel plate'", "PRODUCT(@,@"),
-                ("a tolerance", ENTITY_END, r"#999999=GEOMETRIC_TOLERANCE('',#1);\1", "no such"),
-                ("a material", ENTITY_END, r"#999999=MATERIAL_DESIGNATION('x',#1);\1", "no such"),
+                ("a tolerance", ENTITY_END, r"#999999=GEOMETRIC_TOLERANCE('',#1);\n\1", "no such"),
+                ("a material", ENTITY_END, r"#999999=MATERIAL_DESIGNATION('x',#1);\n\1", "no such"),
                 ("a face's name", r"ADVANCED_FACE\(''", "ADVANCED_FACE('tap M5'", "no name"),
                 ("a comment", "DATA;", "DATA; /* scale by 10 */", "a comment"),
                 (
@@ -532,7 +532,7 @@ UNSURE: Broken = {
         f"carrier.step: {name}": (text_of("carrier.step", old, new, 1), words)
         for name, old, new, words in (
             ("volume in square millimetres", r"(UNIT_ELEMENT\(#\d+,)3\.", r"\g<1>2.", "other"),
-            ("a tolerance", ENTITY_END, r"#999999=GEOMETRIC_TOLERANCE('',#1);\1", "no such"),
+            ("a tolerance", ENTITY_END, r"#999999=GEOMETRIC_TOLERANCE('',#1);\n\1", "no such"),
         )
     },
     ("inventory", GLB): {

@@ -47,11 +47,12 @@ def refuse_foreign(table: StepTable) -> None:
     if not _form("", rules["header"]).pattern.fullmatch("".join(table.head.split())):
         raise ValueError(f"the header is none of tbcad's: {table.head[:SHOWN]!r}")
     bodies, found, count = table.bodies, {}, Counter[str]()
-    for kind, numbers in table.numbered.items():
+    for kind, every in table.numbered.items():
+        numbers = every
         if kind in rules["geometry"]:
-            count[kind] += len(numbers)
+            count[kind] += len(every)
             nameless = ("",) if kind == FACE else ("''", POINT)
-            numbers = [one for one in numbers if not bodies[one].startswith(nameless)]
+            numbers = [one for one in every if not bodies[one].startswith(nameless)]
         found |= {one: _matched(one, kind, bodies[one]) for one in numbers}
     names = {number: {form.name for form, _ in forms} for number, forms in found.items()}
     for _ in range(DEPTH):

@@ -2,8 +2,8 @@
 
 What one kernel writes and reads can be wrong both times. Names, spheres, planes, holes and
 validation properties are therefore taken from the text. An entity must be written as a build has
-it: `#1 = NAME(...);` or `#1=NAME(...);` at the beginning of a line. A shell has 30,000, of which the verification
-needs a fifth: references and numbers are searched for in the text of those.
+it, `#1 = NAME(...);` with a line's end. A shell has 30,000, of which the verification needs a
+fifth: references and numbers are searched for in the text of those.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from itertools import zip_longest
 
 from tbcad_verify.prototype.context import PrototypeContext
@@ -96,13 +97,10 @@ def run_klipper(text: str, axis: str, switch: float, homed: float) -> Machine:
     lines, faults = [Line(0, "G21", {}, {})], []
     said, enabled = dict[str, float](), False
     for number, line in enumerate(text.splitlines(), 1):
-        found = next(
-            ((m, code) for form, code in FORMS.items() if (m := form.fullmatch(line))), None
-        )
-        if found is None:
+        if (found := _parsed(line)) is None:
             faults.append(f"line {number} is none that a plan has")
             continue
-        told, code = numbers(found[0]), found[1]
+        told, code = found
         enabled |= code == "ENABLE"
         if code == "$H" and not enabled:
             faults.append(f"line {number} homes before the motor is on")
@@ -114,11 +112,19 @@ def run_klipper(text: str, axis: str, switch: float, homed: float) -> Machine:
         elif code != "ENABLE":
             scale = {"F": MINUTE_S} | ({"P": 1 / SECOND_MS} if code == "G4" else {})
             values = {name: value * scale.get(name, 1.0) for name, value in told.items()}
-            values |= {axis: values.pop("X")} if "X" in values else {}
+            if "X" in values:
+                values[axis] = values.pop("X")
             # Pins wait for the motion, as moves do.
             lines += [Line(number, "G4", {"P": 0.0}, {})] * code.startswith(("M6", "M8", "M9"))
             lines.append(Line(number, code, values, told))
     return run_lines([*lines, Line(len(lines), "M2", {}, {})], faults, switch, homed)
+
+
+@lru_cache
+def _parsed(line: str) -> tuple[dict[str, float], str] | None:
+    """The numbers that a line tells, and its code; most lines come often."""
+    found = ((form.fullmatch(line), code) for form, code in FORMS.items())
+    return next(((numbers(match), code) for match, code in found if match), None)
 
 
 def config_faults(context: PrototypeContext, ratio: float) -> Iterator[str]:
