@@ -277,7 +277,7 @@ REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
     "ball number": (ball(2, lambda row: row.update(number="7")), "ball 2 must have number 2"),
     "ball kind": (
         ball(2, lambda row: row.update(kind="cube")),
-        "line 3: kind is cube, allowed is ball or cap",
+        "line 3: kind is cube: it should be 'ball' or 'cap'",
     ),
     "ball nan": (ball(2, lambda row: row.update(py="nan")), "line 3: py is nan"),
     "part above": (in_record("parts", 0, "stl", to="../carrier.stl"), "plain file name"),
