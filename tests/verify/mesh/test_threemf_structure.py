@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tbcad_verify.mesh.threemf import DIGITS, _figures
+from tbcad_verify.mesh.threemf import _figures
 
 TRIANGLES = b"".join(b'\n\t<triangle v1="%d" v2="7" v3="10" />' % k for k in range(9)) + b"\n"
 
@@ -12,7 +12,7 @@ TRIANGLES = b"".join(b'\n\t<triangle v1="%d" v2="7" v3="10" />' % k for k in ran
 def test_figures_of_all_items() -> None:
     expected = [[k, 7, 10] for k in range(9)]
     for text in (TRIANGLES, TRIANGLES.replace(b" />", b"/>", 3)):
-        assert np.array_equal(_figures(text, "triangles", DIGITS), expected)
+        assert np.array_equal(_figures(text, "triangles", np.int64), expected)
 
 
 @pytest.mark.parametrize("count", [1, 9])
@@ -28,4 +28,4 @@ def test_figures_of_all_items() -> None:
 )
 def test_anything_else_is_refused(old: bytes, new: bytes, count: int) -> None:
     with pytest.raises(ValueError, match="list of triangles"):
-        _figures(TRIANGLES.replace(old, new, count), "triangles", DIGITS)
+        _figures(TRIANGLES.replace(old, new, count), "triangles", np.int64)

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 import zipfile
 import zlib
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +24,6 @@ from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.record.files import AGAIN, MAX_BYTES, FileBytes, read
 from tbcad_verify.record.validation import shown
 from tbcad_verify.report.checks import Check, CheckName, at_most
-from tbcad_verify.types import Floats
 
 ROUNDED_MM = 1e-6  # the text has six decimals
 LARGEST_RATIO = 200.0  # of unpacked to packed bytes; meshes as text reach 10
@@ -78,14 +79,14 @@ def read_3mf(folder: Path, name: str) -> tuple[NDArray[np.float32], FileBytes]:
             spans = sorted(lists.values()) if key == MODEL else []
             _refuse_other_tags(_without(text, spans), FORMS[key], Path(name).stem)
         points, corners = (
-            _figures(texts[MODEL][slice(*lists[key])], key, digits)
-            for key, digits in (("vertices", DIGITS + b"-."), ("triangles", DIGITS))
+            _figures(texts[MODEL][slice(*lists[key])], key, kind)
+            for key, kind in (("vertices", np.float64), ("triangles", np.int64))
         )
         if not corners.size or corners.max() >= len(points):
             raise ValueError("a triangle without vertices, or none")
     except ValueError as error:
         raise BadExport(f"{blob.name}: {PLACE}: {error}; {AGAIN}") from error
-    return points.astype(np.float32)[corners.astype(np.intp)], blob
+    return points.astype(np.float32)[corners], blob
 
 
 def same_check(name: CheckName, corners: NDArray[np.float32], facets: Facets) -> Check:
@@ -149,8 +150,8 @@ def _refuse_other_tags(text: str, forms: tuple[str, ...], name: str) -> None:
             raise ValueError(f"{shown(tag) or 'its end'} is not allowed, {allowed or 'its end'} is")
 
 
-def _figures(items: bytes, name: str, signs: bytes) -> Floats:
-    """(N, 3) figures of the items of a list.
+def _figures(items: bytes, name: str, kind: type[np.generic]) -> NDArray[Any]:
+    """(N, 3) figures of the items of a list; only floats have signs and points.
 
     ValueError: something else is in it, or a figure has other signs.
     """
@@ -161,9 +162,10 @@ def _figures(items: bytes, name: str, signs: bytes) -> Floats:
         items = items.replace(mark, b" ")
     for end in ENDS:
         items = items.replace(end, b" ")
-    if other := items.translate(None, signs + BLANKS):
+    if other := items.translate(None, DIGITS + BLANKS + b"-." * (kind is np.float64)):
         raise ValueError(f"{shown(other.decode('ascii', 'replace'))} in a list of {name}")
-    words = items.split()
-    if len(words) != 3 * count:
-        raise ValueError(f"a figure is missing in a list of {name}")
-    return np.array(words, dtype=np.float64).reshape(-1, 3)
+    with warnings.catch_warnings(action="ignore"):  # it ends at what is no figure
+        figures = np.fromstring(items, kind, sep=" ")
+    if figures.size != 3 * count:
+        raise ValueError(f"a figure is missing or none in a list of {name}")
+    return figures.reshape(-1, 3)
