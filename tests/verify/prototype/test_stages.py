@@ -280,7 +280,7 @@ REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
         "line 3: kind is cube: it should be 'ball' or 'cap'",
     ),
     "ball nan": (ball(2, lambda row: row.update(py="nan")), "line 3: py is nan"),
-    "part above": (in_record("parts", 0, "stl", to="../carrier.stl"), "plain file name"),
+    "part above": (in_record("parts", 0, "stl", to="../carrier.stl"), "stl is ../carrier.stl"),
     "mesh twice": (in_record("parts", 0, "stl", to="stage.stl"), "STL of their own"),
     "cap of no ball": (in_record("parts", 1, "ball", to=9), "a cap's ball or null"),
     "camera": (in_record("camera", to="z"), "camera 'z'"),

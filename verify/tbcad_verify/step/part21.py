@@ -116,6 +116,19 @@ class StepTable:
                 seen.update(new)
                 todo += new
 
+    def vertices(self, face: int) -> list[int]:
+        """Numbers of the vertices of a face's edges, each at least once."""
+        *bounds, _ = self.references(face)
+        loops = [loop for bound in bounds for loop in self.references(bound)]
+        return [vertex for loop in loops for vertex in self._of_loop(loop)]
+
+    def _of_loop(self, loop: int) -> list[int]:
+        inside = self.references(loop)
+        if self.kinds[loop] == "VERTEX_LOOP":
+            return inside
+        edges = [edge for oriented in inside for edge in self.references(oriented)]
+        return [vertex for edge in edges for vertex in self.references(edge)[:2]]
+
     def _but_geometry(self, number: int) -> list[int]:
         if number not in self._topology:
             kinds = self.kinds
