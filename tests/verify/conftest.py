@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from tbcad_verify.record.export import Export, read_export
+from tbcad_verify.shell import integrity
 from tbcad_verify.shell.optics import OpticalSetup
 
 from tests.verify.optical_setups import optical_setup_of
@@ -15,10 +16,22 @@ from tests.verify.synthetic_export import Cells, Design, export
 SAMPLE = Path(__file__).parents[2] / "docs" / "sample"
 
 
+@pytest.fixture(autouse=True)
+def meshes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts of synthetic exports have neither STEP nor 3MF; the corpus asks for all three."""
+    monkeypatch.setattr(integrity, "KINDS", {"stl": ".stl"})
+
+
 @pytest.fixture(scope="session")
 def sample() -> Export:
     """The committed one, as tbcad wrote it."""
     return read_export(SAMPLE)
+
+
+@pytest.fixture
+def sample_folder(tmp_path: Path) -> Path:
+    """A copy of the sample, for verifications in processes of their own."""
+    return Path(shutil.copytree(SAMPLE, tmp_path / "sample"))
 
 
 @pytest.fixture(scope="session")

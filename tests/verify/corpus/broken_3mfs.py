@@ -17,6 +17,9 @@ BEAMS = (
     '<b:beamlattice minlength="0.1" radius="1" clippingmode="none"><b:beams>'
     '<b:beam v1="0" v2="1"/></b:beams></b:beamlattice>'
 )
+TITLE = '<metadata name="Title">in inches</metadata>'
+MATERIAL = '<basematerials id="2"><base name="x" displaycolor="#FFFFFF"/></basematerials>'
+RELATIONS = "_rels/.rels"
 BOMB = 100_000_000  # bytes of zeros, which pack to a thousandth
 
 
@@ -121,7 +124,7 @@ THREEMFS: tuple[Mutation, ...] = (
         ("no zip", data(lambda _: b"solid" * 100), NAME, "zip"),
         ("empty", data(lambda _: b""), NAME, "zip"),
         ("a bomb", members(bomb), NAME, "claim to unpack"),
-        ("a bomb that hides it", liar, NAME, "damaged"),
+        ("a bomb that hides it", liar, NAME, "CRC"),
         ("a member's own head broken", data(renamed), NAME, "zip"),
         ("no model", members(lambda _: {"x": b"y"}), NAME, "broken 3MF"),
         ("text that ends early", members(lambda m: {**m, MODEL: m[MODEL][:-5000]}), NAME),
@@ -150,9 +153,18 @@ THREEMFS: tuple[Mutation, ...] = (
         (
             "a colour on a facet",
             first_triangle(lambda t: t.replace("/>", 'pid="1"/>')),
-            *(NAME, "with v1, v2, v3 only"),
+            *(NAME, "in a list of triangles"),
         ),
-        ("a comment", swapped("<vertices>", "<vertices><!-- -->"), NAME, "comments"),
+        ("a comment", swapped("<vertices>", "<vertices><!-- -->"), NAME, "list of vertices"),
+        ("another name", swapped('name="shell_a"', 'name="shell_b"'), NAME, "shell_b"),
+        ("a title", swapped("<resources>", TITLE + "<resources>"), NAME, "<metadata"),
+        ("a material", swapped("<resources>", "<resources>" + MATERIAL), NAME, "<basematerials"),
+        ("an entity", swapped("<model ", "<!DOCTYPE x><model "), NAME, "<!DOCTYPE"),
+        (
+            "another relation",
+            members(lambda m: {**m, RELATIONS: m[RELATIONS].replace(b"3dmodel", b"thumbnail", 1)}),
+            *(NAME, "thumbnail"),
+        ),
         (
             "an extension asked for",
             swapped("<model ", '<model requiredextensions="b" '),
@@ -161,7 +173,7 @@ THREEMFS: tuple[Mutation, ...] = (
         (
             "an object that is not built",
             swapped("</resources>", '<object id="2"><mesh/></object></resources>'),
-            *(NAME, "resources must hold object"),
+            *(NAME, '<object id="2"> is not allowed'),
         ),
     ),
 )

@@ -284,8 +284,8 @@ RECORDS: tuple[Mutation, ...] = (
         ("another radius rule", spec("mirrors", radius_rule="paper"), "radius rule", "by rule"),
         ("a mesh error", spec("mesh", structure_error_mm=5.0), "requirements", "mesh error"),
         ("a part forgotten", design(lambda one: one["parts"].pop()), "mirrors found", "b0001"),
-        ("no STEP", without("step"), "manifest", "shell_a.step"),
-        ("no 3MF", without("3mf"), "manifest", "shell_a.3mf"),
+        ("no STEP", without("step"), "part files", "shell_a has none"),
+        ("no 3MF", without("3mf"), "part files", "shell_a has none"),
         ("a part for the other camera", part(camera="b"), "mirrors found", "missing"),
     ),
     *failing(
@@ -298,7 +298,7 @@ RECORDS: tuple[Mutation, ...] = (
     *refusing(
         TABLE,
         ("a second column", as_text(TABLE, second_column), "column radius_mm is there twice"),
-        ("NaN", word(b"nan"), TABLE, "line 6: px is nan, allowed"),
+        ("NaN", word(b"nan"), TABLE, "line 6: px is nan: it should"),
         ("a field empty", word(b""), TABLE, "line 6: px is ''"),
         ("a field too many", word(b"1.0,2.0"), TABLE, "line 6 has"),
         ("cut in a line", as_text(TABLE, lambda b: b[:-30]), TABLE, "truncated"),
@@ -320,7 +320,7 @@ RECORDS: tuple[Mutation, ...] = (
         ("a sensor without columns", camera(width_px=0), "width_px"),
         ("a target in words", top(target_mm="60"), "target_mm"),
         ("no parts", top(parts=[]), "parts"),
-        ("a part outside", part(stl="../shell_a.stl"), "plain file name"),
+        ("a part outside", part(stl="../shell_a.stl"), "stl is ../shell_a.stl"),
         ("a part that is not there", part(**{"3mf": "x.3mf"}), "x.3mf", "missing"),
     ),
     *refusing(

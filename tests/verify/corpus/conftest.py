@@ -30,6 +30,11 @@ PROTOTYPE_SETTINGS = (
 )
 
 
+@pytest.fixture(autouse=True)
+def meshes_alone() -> None:
+    """Every part of a build has all its files."""
+
+
 @pytest.fixture(scope="session")
 def good_prototype(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A small prototype as `tbcad build` writes it; tests break copies of it only."""

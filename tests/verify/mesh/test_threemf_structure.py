@@ -1,41 +1,31 @@
-"""A list of items by the count of all parts."""
+"""Lists of figures in a 3MF: nothing else is in them."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
-from tbcad_verify.mesh.threemf import are_counted
+from tbcad_verify.mesh.threemf import _figures
 
-VERTEX = b"vertex", (b"x", b"y", b"z")
-TRIANGLE = b"triangle", (b"v1", b"v2", b"v3")
-VERTICES = b"".join(b'\n\t<vertex x="%d.5" y="-%d" z="0.25" />' % (k, k) for k in range(9)) + b"\n"
 TRIANGLES = b"".join(b'\n\t<triangle v1="%d" v2="7" v3="10" />' % k for k in range(9)) + b"\n"
 
 
-@pytest.mark.parametrize(("text", "item"), [(VERTICES, VERTEX), (TRIANGLES, TRIANGLE)])
-def test_items_differ_in_digits_and_blanks(
-    text: bytes, item: tuple[bytes, tuple[bytes, ...]]
-) -> None:
-    assert are_counted(text, *item)
-    assert are_counted(text.replace(b" />", b"/>", 3), *item)
+def test_figures_of_all_items() -> None:
+    expected = [[k, 7, 10] for k in range(9)]
+    for text in (TRIANGLES, TRIANGLES.replace(b" />", b"/>", 3)):
+        assert np.array_equal(_figures(text, "triangles", np.int64), expected)
 
 
 @pytest.mark.parametrize("count", [1, 9])
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        (b' v3="10"', b""),
+        *((b' v3="10"', new) for new in (b"", b' v3="10" pid="4"', b' v3="10 3"', b' v3=""')),
+        *((b' v3="10"', new) for new in (b' v3="1e1"', b' v3="-1"', b' v3="1.5"', b" v3='10'")),
         (b"v1=", b"v2="),
-        (b' v3="10"', b' v3="10" pid="4"'),
-        (b"<triangle", b"<!-- --><triangle"),
-        (b"<triangle", b"<quad"),
-        (b"/>", b"></triangle>"),
-        (b"/>", b"><item /></triangle>"),
+        *((b"<triangle", new) for new in (b"<!-- --><triangle", b"<quad", b"=<triangle")),
+        *((b"/>", new) for new in (b"></triangle>", b"><item /></triangle>", b"/>5")),
     ],
 )
-def test_other_items_are_refused(old: bytes, new: bytes, count: int) -> None:
-    assert not are_counted(TRIANGLES.replace(old, new, count), *TRIANGLE)
-
-
-def test_text_between_items_is_refused() -> None:
-    for text in (VERTICES + b"<vertex", VERTICES.replace(b"\n\t<", b"=<", 1)):
-        assert not are_counted(text, *VERTEX)
+def test_anything_else_is_refused(old: bytes, new: bytes, count: int) -> None:
+    with pytest.raises(ValueError, match="list of triangles"):
+        _figures(TRIANGLES.replace(old, new, count), "triangles", np.int64)

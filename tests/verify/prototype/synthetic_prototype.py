@@ -51,7 +51,7 @@ NOT_MADE = {
     *("camera mount", "camera gauge", "cap tilt", "plays", "shroud", "radius rule"),
     *("lamps", "light before and after", "light of the lamps", "light from above"),
     *("light in the stage's shadow", "hold ratio", "drive", "motor bearing", "power off"),
-    *("fall energy", "object room", "leds seen"),
+    *("fall energy", "object room", "leds seen", "part files"),
 }
 
 

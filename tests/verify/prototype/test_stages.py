@@ -76,8 +76,8 @@ def test_a_good_prototype_passes(prototype_folder: Path) -> None:
 
 
 def test_verification_in_another_process_is_the_same(prototype_folder: Path) -> None:
-    here = verify(prototype_folder, options=replace(IN_PROCESS, write=False))
-    apart = verify(prototype_folder, options=replace(IN_PROCESS, write=False, apart=True))
+    here = judged(verify(prototype_folder, options=replace(IN_PROCESS, write=False)))
+    apart = judged(verify(prototype_folder, options=replace(IN_PROCESS, write=False, apart=True)))
     assert apart.to_json() == here.to_json()
 
 
@@ -269,10 +269,10 @@ REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
     "ball missing": (in_table("balls.csv", list.pop), "one for each ball"),
     "ball kind": (
         ball(2, lambda row: row.update(kind="cube")),
-        "line 3: kind is cube, allowed is ball or cap",
+        "line 3: kind is cube: it should be 'ball' or 'cap'",
     ),
     "ball nan": (ball(2, lambda row: row.update(py="nan")), "line 3: py is nan"),
-    "part above": (in_record("parts", 0, "stl", to="../carrier.stl"), "plain file name"),
+    "part above": (in_record("parts", 0, "stl", to="../carrier.stl"), "stl is ../carrier.stl"),
     "mesh twice": (in_record("parts", 0, "stl", to="stage.stl"), "STL of their own"),
     "cap of no ball": (in_record("parts", 1, "ball", to=9), "a cap's ball or null"),
     "plan ragged": (lambda f: (f / PLAN).write_text((f / PLAN).read_text() + "1,2\n"), "2 fields"),

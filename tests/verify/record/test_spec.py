@@ -84,7 +84,7 @@ def test_a_value_outside_its_range_is_refused(
     from tests.verify.record.test_bad_input import test_broken_export_is_refused
 
     change = design(lambda found: found["spec"][section].update({key: value}))
-    mutation = refused(key, JSON, change, f"spec.{section}.{key} is {value}, allowed is")
+    mutation = refused(key, JSON, change, f"spec.{section}.{key} is {value}: ")
     test_broken_export_is_refused(export_folder, mutation)
 
 

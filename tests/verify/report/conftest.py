@@ -11,6 +11,7 @@ from tbcad_verify.report.checks import Check
 from tbcad_verify.report.methods import KEY_FIGURES
 from tbcad_verify.report.report import Report
 from tbcad_verify.run.verify import verify
+from tbcad_verify.shell import integrity
 
 from tests.verify.optical_setups import IN_PROCESS
 from tests.verify.synthetic_export import Cells
@@ -24,7 +25,9 @@ YIELDS = (
 @pytest.fixture(scope="session")
 def shell_report(synthetic_shells: tuple[Path, Cells]) -> Report:
     """Of shells only."""
-    report = verify(synthetic_shells[0], options=replace(IN_PROCESS, write=False))
+    with pytest.MonkeyPatch.context() as meshes_alone:
+        meshes_alone.setattr(integrity, "KINDS", {"stl": ".stl"})
+        report = verify(synthetic_shells[0], options=replace(IN_PROCESS, write=False))
     return replace(report, folder=Path("exports"))
 
 

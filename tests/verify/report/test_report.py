@@ -78,9 +78,9 @@ def test_same_export_same_bytes(export_folder: Path, monkeypatch: pytest.MonkeyP
     assert contents(export_folder) == before
 
 
-def test_command_line(export_folder: Path) -> None:
+def test_command_line(sample_folder: Path) -> None:
     run = subprocess.run(
-        [sys.executable, "-m", "tbcad_verify", str(export_folder)],
+        [sys.executable, "-m", "tbcad_verify", str(sample_folder)],
         capture_output=True,
         encoding="utf-8",
         check=False,

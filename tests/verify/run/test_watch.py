@@ -91,13 +91,13 @@ def test_results_add_up() -> None:
     np.testing.assert_array_equal(results.mirrors["pixels"], column)
 
 
-def test_the_result_is_the_same_in_a_process_of_its_own(export_folder: Path) -> None:
+def test_the_result_is_the_same_in_a_process_of_its_own(sample_folder: Path) -> None:
     said: list[str] = []
-    assert verify(export_folder, said.append).passed
-    apart = (export_folder / NAME).read_bytes()
+    assert verify(sample_folder, said.append).passed
+    apart = (sample_folder / NAME).read_bytes()
     here: list[str] = []
-    assert verify(export_folder, here.append, VerifyOptions(apart=False)).passed
-    assert (export_folder / NAME).read_bytes() == apart
+    assert verify(sample_folder, here.append, VerifyOptions(apart=False)).passed
+    assert (sample_folder / NAME).read_bytes() == apart
     assert said == here
 
 

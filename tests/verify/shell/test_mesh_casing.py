@@ -9,7 +9,9 @@ import pytest
 from tbcad_verify.mesh.holes import RoundHoles, round_holes
 from tbcad_verify.mesh.mesh import Mesh, indexed_mesh, mesh_from_facets
 from tbcad_verify.mesh.segments import measure_edges
+from tbcad_verify.mesh.spheroids import growth
 from tbcad_verify.mesh.stl import read_facets
+from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.record.export import Export
 from tbcad_verify.shell.mesh_casing import (
     MeshCasing,
@@ -56,13 +58,13 @@ def test_the_sample_is_as_designed(setup: OpticalSetup, holes: dict[str, RoundHo
 
 
 def test_the_wall_between_spheres_and_spheroids() -> None:
-    sphere = MeshCasing(np.array([100.0, 100.0]), 2.0, 5.0, 4.5)
-    assert sphere.walls() == pytest.approx((2.5, 3.0), abs=1e-12)
+    sphere = MeshCasing(np.array([100.0, 100.0]), 2.0, 5.0, (4.5, 5.25))
+    assert sphere.walls() == pytest.approx([3.0, 2.5, 3.25], abs=1e-12)
     # Parallel planes touch two convex bodies where they are nearest: support functions.
     angle = np.linspace(0, np.pi / 2, 100_001)
     support = [np.hypot((140 + by) * np.cos(angle), (100 + by) * np.sin(angle)) for by in (2, 9)]
-    long = MeshCasing(np.array([140.0, 100.0]), 2.0, 9.0, 9.0)
-    assert long.walls()[1] == pytest.approx((support[1] - support[0]).min(), abs=1e-6)
+    long = MeshCasing(np.array([140.0, 100.0]), 2.0, 9.0, (9.0, 9.0))
+    assert long.walls()[0] == pytest.approx((support[1] - support[0]).min(), abs=1e-6)
 
 
 @pytest.mark.parametrize("by", [-1.1e-2, 1.1e-2])
@@ -93,6 +95,32 @@ def test_a_dent_behind_a_valley_is_found_in_its_half_alone(
     found = casing_checks(dented, holes)
     assert [one.passed for one in found] == [False, True, True, True]
     assert found[0].measured == pytest.approx(0.1, rel=0.05)
+
+
+@pytest.mark.parametrize("by", [-2.0, 2.0])
+def test_a_wall_moved_where_no_valley_is_before_it_is_found(
+    sample: Export, setup: OpticalSetup, holes: dict[str, RoundHoles], by: float
+) -> None:
+    """Free corners of the coarse back, one by one."""
+    mesh, casing, camera = setup.mesh, measure_casing(setup, 0), sample.cameras["a"]
+    points, flange = mesh.points, sample.spec.shell.seam_flange.thickness_mm
+    on_back = np.abs(growth(casing.semi_axes, camera, points.T) - casing.beyond) < 1e-3
+    free = on_back & (points[:, 0] > flange) & (points[:, 2] > sample.foot_z_mm + 2 * flange)
+    outward = unit(points.T - camera.pinhole[:, None] / 2).T
+    assert np.count_nonzero(free) > 20
+    for corner in np.flatnonzero(free)[::5].tolist():
+        moved = points + by * outward * (np.arange(len(points)) == corner)[:, None]
+        found = casing_checks(replace(setup, mesh=replace(mesh, points=moved)), holes)
+        assert found[0].passed is False
+
+
+def test_a_facet_for_many_is_too_far_from_the_back(
+    sample: Export, meshes: list[Mesh], setup: OpticalSetup, holes: dict[str, RoundHoles]
+) -> None:
+    finer = sample.spec.mesh.model_copy(update={"structure_error_mm": 0.01, "chord_error_mm": 0.01})
+    other = replace(sample, spec=sample.spec.model_copy(update={"mesh": finer}))
+    found = casing_checks(replace(setup, export=other), holes)
+    assert [one.passed for one in found] == [False, True] * 2
 
 
 def test_holes_elsewhere_are_faults(setup: OpticalSetup, holes: dict[str, RoundHoles]) -> None:

@@ -1,20 +1,20 @@
 """3MF files: a closed grammar of what tbcad writes, compared with the STL triangle by triangle.
 
 A slicer obeys elements that leave the mesh as it is: transforms, components, types of objects, beam
-lattices, further parts. None of them has a use here, so each is refused by name.
+lattices, further parts. None of them has a use here. So every tag has the one form that it has in
+a build, in its order; between them is nothing, and in both lists of the mesh are figures alone.
 """
 
 from __future__ import annotations
 
-import ctypes
 import io
-import tempfile
+import re
+import warnings
 import zipfile
 import zlib
-from functools import cache
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,54 +27,66 @@ from tbcad_verify.report.checks import Check, CheckName, at_most
 
 ROUNDED_MM = 1e-6  # the text has six decimals
 LARGEST_RATIO = 200.0  # of unpacked to packed bytes; meshes as text reach 10
-MODEL = "3D/3dmodel.model"
-MEMBERS = (MODEL, "[Content_Types].xml", "_rels/.rels")
-CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
-UUID = "{http://schemas.microsoft.com/3dmanufacturing/production/2015/06}UUID"
-LANGUAGE = "{http://www.w3.org/XML/1998/namespace}lang"
-IDENTITY = "1 0 0 0 1 0 0 0 1 0 0 0"
+MODEL, TYPES, RELATIONS = "3D/3dmodel.model", "[Content_Types].xml", "_rels/.rels"
 PLACE = "must hold one mesh in millimetres, to be built once where it stands"
-# Children and attributes of every element outside the lists of vertices and triangles.
-CHILDREN: dict[str, tuple[str, ...]] = {
-    "model": ("resources", "build"),
-    "resources": ("object",),
-    "object": ("mesh",),
-    "mesh": ("vertices", "triangles"),
-    "vertices": (),
-    "triangles": (),
-    "build": ("item",),
-    "item": (),
+XML = r'<\?xml version="1\.0" encoding="utf-8"\?>'
+SCHEMAS = "http://schemas.microsoft.com/3dmanufacturing"
+UUID = r' p:UUID="[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}"'
+# Names of extensions that the library knows; without `requiredextensions` they ask for nothing.
+EXTENSIONS = r'(?: xmlns:[a-z]{1,2}="http://schemas\.[\w./]+")*'
+MILLIMETRES = 'unit="millimeter" xml:lang="en-US"'
+PACKAGE = r"http://schemas\.openxmlformats\.org/package/2006/[\w-]+"
+FORMS = {
+    MODEL: (
+        *(XML, rf'<model xmlns="{SCHEMAS}/core/2015/02" {MILLIMETRES}{EXTENSIONS}>'),
+        *("<resources>", rf'<object id="1" name="NAME" type="model"{UUID}>', "<mesh>"),
+        *("<vertices>", "</vertices>", "<triangles>", "</triangles>", "</mesh>", "</object>"),
+        *("</resources>", f"<build{UUID}>", f'<item objectid="1"{UUID} ?/>'),
+        *("</build>", "</model>"),
+    ),
+    TYPES: (
+        *(XML, f'<Types xmlns="{PACKAGE}">'),
+        *6 * (r'<Default Extension="[a-z]+" ContentType="[\w./+-]+" ?/>',),
+        "</Types>",
+    ),
+    RELATIONS: (
+        *(XML, f'<Relationships xmlns="{PACKAGE}">'),
+        rf'<Relationship Type="{SCHEMAS}/2013/01/3dmodel" Target="/{MODEL}" Id="rel0" ?/>',
+        "</Relationships>",
+    ),
 }
-# None: any value.
-ATTRIBUTES: dict[str, dict[str, str | None]] = {
-    "model": {"unit": "millimeter", LANGUAGE: None},
-    "object": {"id": "1", "name": None, "type": "model", UUID: None},
-    "build": {UUID: None},
-    "item": {"objectid": "1", "transform": IDENTITY, UUID: None},
-}
-REQUIRED = {"model": ("unit",), "object": ("id",), "item": ("objectid",)}
-COMMENTS = "comments, entities and instructions are not allowed"
 LISTS = {
-    "vertices": (b"vertex", (b"x", b"y", b"z")),
-    "triangles": (b"triangle", (b"v1", b"v2", b"v3")),
+    "vertices": (b'<vertex x="', b'" y="', b'" z="'),
+    "triangles": (b'<triangle v1="', b'" v2="', b'" v3="'),
 }
+ENDS = b'" />', b'"/>'
+BLANKS, DIGITS = b" \t\r\n", b"0123456789"
 
 
 def read_3mf(folder: Path, name: str) -> tuple[NDArray[np.float32], FileBytes]:
     """(F, 3, 3) corners of the one mesh of a 3MF, mm, and the bytes they came from.
 
-    Raises:
-        BadExport: no zip, members that lie about their size or unpack to too much, or anything
-            but one mesh in millimetres.
+    BadExport: no zip, members that lie about their size or unpack to too much, or anything but one
+    mesh in millimetres that has the file's name.
 
-    Source: 3MF Core Specification 1.3, section 4.
+    Source: 3MF Core Specification 1.3, chapters 3 and 4.
     """
     blob = read(folder, name)
-    check_structure(blob)
-    with tempfile.TemporaryDirectory(prefix="tbcad-3mf-") as place:
-        copy = Path(place) / "part.3mf"  # the library takes bytes one by one, and files at once
-        blob.data.tofile(copy)
-        return _corners(blob.name, copy), blob
+    texts = _members(blob)
+    try:
+        lists = {key: _list_span(texts[MODEL], key) for key in LISTS}
+        for key, text in texts.items():
+            spans = sorted(lists.values()) if key == MODEL else []
+            _refuse_other_tags(_without(text, spans), FORMS[key], Path(name).stem)
+        points, corners = (
+            _figures(texts[MODEL][slice(*lists[key])], key, kind)
+            for key, kind in (("vertices", np.float64), ("triangles", np.int64))
+        )
+        if not corners.size or corners.max() >= len(points):
+            raise ValueError("a triangle without vertices, or none")
+    except ValueError as error:
+        raise BadExport(f"{blob.name}: {PLACE}: {error}; {AGAIN}") from error
+    return points.astype(np.float32)[corners], blob
 
 
 def same_check(name: CheckName, corners: NDArray[np.float32], facets: Facets) -> Check:
@@ -88,69 +100,7 @@ def same_check(name: CheckName, corners: NDArray[np.float32], facets: Facets) ->
     return at_most(name, float(difference[worst]), limit, f"facet {worst} is elsewhere in the STL")
 
 
-@cache
-def _library() -> Any:
-    """The library with its table of functions, which takes long to fill."""
-    import lib3mf
-
-    return lib3mf.get_wrapper()
-
-
-def _corners(name: str, path: Path) -> NDArray[np.float32]:
-    import lib3mf
-
-    model = _library().CreateModel()
-    try:
-        model.QueryReader("3mf").ReadFromFile(str(path))
-        objects, items = model.GetObjects(), model.GetBuildItems()
-        good = objects.Count() == items.Count() == 1
-    except lib3mf.ELib3MFException as error:
-        raise BadExport(f"{name}: broken 3MF ({error}); {AGAIN}") from error
-    if not good:
-        raise BadExport(f"{name}: {PLACE}; {AGAIN}")
-    meshes = model.GetMeshObjects()
-    meshes.MoveNext()
-    part = meshes.GetCurrentMeshObject()
-    if not part.GetVertexCount() or not part.GetTriangleCount():
-        raise BadExport(f"{name}: a mesh without triangles; {AGAIN}")
-    points = _rows(part, "getvertices", part.GetVertexCount(), np.float32)
-    corners = _rows(part, "gettriangleindices", part.GetTriangleCount(), np.uint32)
-    return np.asarray(points[corners], np.float32)
-
-
-def _rows(part: Any, function: str, count: int, kind: type[np.generic]) -> NDArray[Any]:
-    """(count, 3) numbers of a mesh, by the library's own function.
-
-    Its Python methods make an object of each row, which takes twenty times as long.
-    """
-    rows, library = np.empty((count, 3), kind), _library()
-    call = getattr(library.lib, f"lib3mf_meshobject_{function}")
-    buffer = rows.ctypes.data_as(call.argtypes[-1])
-    library.checkError(part, call(part._handle, count, ctypes.c_uint64(), buffer))
-    return rows
-
-
-def check_structure(blob: FileBytes) -> None:
-    """Refuse a 3MF that is anything but one mesh, in millimetres, built once where it stands.
-
-    Raises:
-        BadExport: no zip, members that lie about their size or unpack to too much, other members,
-            or an element or attribute that tbcad does not write.
-
-    Source: 3MF Core Specification 1.3, chapters 3 and 4.
-    """
-    model = _model_text(blob)
-    try:
-        skeleton = _without_lists(model)
-        root = ElementTree.fromstring(skeleton)
-        _check_element(root, "model")
-    except ElementTree.ParseError as error:
-        raise BadExport(f"{blob.name}: broken 3MF ({error}); {AGAIN}") from error
-    except ValueError as error:
-        raise BadExport(f"{blob.name}: {PLACE}: {error}; {AGAIN}") from error
-
-
-def _model_text(blob: FileBytes) -> bytes:
+def _members(blob: FileBytes) -> dict[str, bytes]:
     """The members' sizes first; then each member's own head and check sum against the directory."""
     try:
         with zipfile.ZipFile(io.BytesIO(blob.data.tobytes())) as archive:
@@ -160,93 +110,62 @@ def _model_text(blob: FileBytes) -> bytes:
                 claim = f"{blob.data.size} bytes that claim to unpack to {unpacked}"
                 raise BadExport(f"{blob.name}: {claim}; {AGAIN}")
             names = sorted(member.filename for member in members)
-            if names != sorted(MEMBERS):
-                given = shown(", ".join(names))
-                allowed = ", ".join(MEMBERS)
+            if names != sorted(FORMS):
+                given, allowed = shown(", ".join(names)), ", ".join(FORMS)
                 raise BadExport(
                     f"{blob.name}: broken 3MF (members are {given}, allowed are {allowed}, each "
                     f"once); {AGAIN}"
                 )
-            return {name: _member(blob.name, archive, name) for name in MEMBERS}[MODEL]
+            return {name: archive.read(name) for name in FORMS}
     except (zipfile.BadZipFile, zlib.error, OSError, ValueError, NotImplementedError) as error:
-        raise BadExport(f"{blob.name}: no 3MF, which is a zip ({error}); {AGAIN}") from error
-
-
-def _member(file: str, archive: zipfile.ZipFile, name: str) -> bytes:
-    try:
-        return archive.read(name)
-    except zipfile.BadZipFile as error:
-        if "CRC" not in str(error):
-            raise
-        raise BadExport(f"{file}: the zip's member {name} is damaged; {AGAIN}") from error
-
-
-def _without_lists(model: bytes) -> bytes:
-    """The model's text without vertices and triangles, which are nothing else than those.
-
-    ValueError: there is more in the text, or less.
-    """
-    spans = {name: _list_span(model, name) for name in LISTS}
-    starts, ends = zip(*sorted(spans.values()), strict=True)
-    rest = b"".join(model[i:j] for i, j in zip((0, *ends), (*starts, None), strict=True))
-    if b"<!" in rest or rest.count(b"<?") > 1:
-        raise ValueError(COMMENTS)
-    for name, (item, attributes) in LISTS.items():
-        items = model[slice(*spans[name])]
-        if not are_counted(items, item, attributes):
-            if b"<!" in items or b"<?" in items:
-                raise ValueError(COMMENTS)
-            keys = ", ".join(key.decode() for key in attributes)
-            raise ValueError(f"a list of {name} has {item.decode()} with {keys} only")
-    return rest
-
-
-def are_counted(items: bytes, item: bytes, attributes: tuple[bytes, ...]) -> bool:
-    """Whether a text has as many of all parts as of items, and nothing else in angle brackets."""
-    parts = (b"<", b"/>", b">", *(b' %s="' % key for key in attributes))
-    count = items.count(b"<%s " % item)
-    same = {items.count(part) for part in parts} == {count}
-    return same and items.count(b"=") == len(attributes) * count
+        raise BadExport(f"{blob.name}: no 3MF, which is a whole zip ({error}); {AGAIN}") from error
 
 
 def _list_span(model: bytes, name: str) -> tuple[int, int]:
     """Where a list's items begin and end in the model's text.
 
-    ValueError: there is no such list, or a second one.
+    ValueError: there is no such list.
     """
     opened, closed = b"<%s>" % name.encode(), b"</%s>" % name.encode()
     start = model.find(opened) + len(opened)
     end = model.find(closed, start)
-    if start < len(opened) or end < 0 or model.find(opened, end) >= 0:
+    if start < len(opened) or end < 0:
         raise ValueError(f"one list of {name} is allowed, without attributes")
     return start, end
 
 
-def _check_element(element: ElementTree.Element, name: str) -> None:
-    """Refuse an element whose name, attributes or children are others than tbcad writes.
+def _without(text: bytes, spans: list[tuple[int, int]]) -> str:
+    """A text without some of its pieces. ValueError: what is left has other signs than ASCII."""
+    starts, ends = [start for start, _ in spans], [end for _, end in spans]
+    pieces = (text[i:j] for i, j in zip([0, *ends], [*starts, None], strict=True))
+    return b"".join(pieces).decode("ascii")
 
-    ValueError: what is not allowed.
+
+def _refuse_other_tags(text: str, forms: tuple[str, ...], name: str) -> None:
+    """Refuse a text that is no list of tags, each of its form. ValueError: the first other one."""
+    tags = re.sub(r">\s+<", "><", text.strip()).replace("><", ">\n<").split("\n")
+    for tag, form in zip_longest(tags, forms, fillvalue=""):
+        allowed = form.replace("NAME", re.escape(name))
+        if not re.fullmatch(allowed, tag):
+            raise ValueError(f"{shown(tag) or 'its end'} is not allowed, {allowed or 'its end'} is")
+
+
+def _figures(items: bytes, name: str, kind: type[np.generic]) -> NDArray[Any]:
+    """(N, 3) figures of the items of a list; only floats have signs and points.
+
+    ValueError: something else is in it, or a figure has other signs.
     """
-    if element.tag != CORE + name:
-        raise ValueError(f"{_plain(element.tag)} is not allowed, {name} is")
-    allowed = ATTRIBUTES.get(name, {})
-    for key, value in element.attrib.items():
-        if key not in allowed or allowed[key] not in (None, value):
-            raise ValueError(f'{name} with {_plain(key)}="{shown(value)}" is not allowed')
-    for key in REQUIRED.get(name, ()):
-        if key not in element.attrib:
-            raise ValueError(f"{name} without {key}")
-    text = [element.text, *(child.tail for child in element)]
-    if any(part and part.strip() for part in text):
-        raise ValueError(f"text in {name} is not allowed")
-    children = CHILDREN[name]
-    if len(element) != len(children):
-        given = ", ".join(_plain(child.tag) for child in element) or "nothing"
-        raise ValueError(f"{name} must hold {', '.join(children) or 'nothing'}, not {shown(given)}")
-    for child, expected in zip(element, children, strict=True):
-        _check_element(child, expected)
-
-
-def _plain(tag: str) -> str:
-    """A name without its namespace."""
-    return shown(tag.rpartition("}")[2])
+    marks, count = LISTS[name], items.count(b"<")
+    for mark in marks:
+        if items.count(mark) != count:
+            raise ValueError(f"a list of {name} has {marks[0][1:].decode()}...{marks[2].decode()}")
+        items = items.replace(mark, b" ")
+    for end in ENDS:
+        items = items.replace(end, b" ")
+    if other := items.translate(None, DIGITS + BLANKS + b"-." * (kind is np.float64)):
+        raise ValueError(f"{shown(other.decode('ascii', 'replace'))} in a list of {name}")
+    with warnings.catch_warnings(action="ignore"):  # it ends at what is no figure
+        figures = np.fromstring(items, kind, sep=" ")
+    if figures.size != 3 * count:
+        raise ValueError(f"a figure is missing or none in a list of {name}")
+    return figures.reshape(-1, 3)

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import norm
@@ -96,7 +95,8 @@ def _pose(view: HullView, profile: Profile) -> Pose:
     angle, sides = best_rotation(view.seen, width - rim, depth - rim, SLACK_MM)
     size = np.append(sides, view.height)
     excess = float((size - np.array([width - rim, depth - rim, height])).max())
-    rotation = Rotation.from_rotvec([0, 0, angle]).as_matrix()
+    cos, sin = math.cos(angle), math.sin(angle)
+    rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     return Pose(np.einsum("ij,jk->ik", rotation, view.level), size, angle, excess)
 
 

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from tbcad_verify.errors import BadExport
-from tbcad_verify.record.validation import allowed, fault, shown
+from tbcad_verify.record.validation import fault, shown
 
 MAX_BYTES = 100_000  # a profile is one or two thousand
 FOLDER = "profiles"
@@ -29,11 +29,7 @@ def _as_tuple(value: object) -> object:
 
 
 _Side = Annotated[float, Field(gt=0, le=100_000)]
-_Sides = Annotated[
-    tuple[_Side, _Side, _Side],
-    BeforeValidator(_as_tuple),
-    allowed("three numbers above 0 to 100000"),
-]
+_Sides = Annotated[tuple[_Side, _Side, _Side], BeforeValidator(_as_tuple)]
 
 
 class Profile(BaseModel):
@@ -60,9 +56,7 @@ class Profile(BaseModel):
     """Gap between parts that must not stick; also kept free at the rim of the bed."""
     tolerance_mm: float = Field(ge=0, le=100)
     """Maximum error of a dimension, plus or minus."""
-    overhang_deg: Annotated[float | None, allowed("a number from 0 to 90")] = Field(
-        None, ge=0, le=90
-    )
+    overhang_deg: float | None = Field(None, ge=0, le=90)
     """Lean from the vertical beyond which a face needs support; left out where none does."""
     cavities: bool = True
     """Whether a closed cavity may stay: powder or resin is trapped in it, no tool gets in."""
@@ -70,9 +64,7 @@ class Profile(BaseModel):
     """Its name."""
     density_g_cm3: float = Field(gt=0, le=30)
     """Of the made part, solid."""
-    max_triangles: Annotated[int | None, allowed("a whole number from 1 to 1000000000")] = Field(
-        None, ge=1, le=10**9
-    )
+    max_triangles: int | None = Field(None, ge=1, le=10**9)
     """That the machine's software reads; left out where it is not known."""
 
 

@@ -28,6 +28,7 @@ from tbcad_verify.report.checks import (
     at_most,
     guarded,
     no_faults,
+    require,
     short_list,
 )
 from tbcad_verify.step import part_checks
@@ -41,6 +42,8 @@ FILE = RECORD
 CHECKS = {"inventory": "faults", "leds as designed": "faults", "assembly step": "mm"}
 TURNING = frozenset({"wheel", "shaft", "collar", "coupling", "rotary_stage_top"})
 VIEWS = frozenset({"capture_sphere", "camera_view"})
+COUPON, SIZE_DIGITS = "coupon_", 6  # names of coupons; decimals of sizes that are the same, mm
+COUPONS = ("coupons", f"{COUPON}*.step", "seats")
 TOOL = "tool"  # role of parts that are not in the assembly
 SAME_MM = 1e-6  # of corners in two STEP files
 SINGLE_MM = 2e-3  # of the same corner in the GLB, whose numbers are single precision
@@ -244,7 +247,7 @@ def part_step_checks(
         )
         return part_checks.run_checks(part_checks.CHECKS, part.step, comparison)
 
-    return [
+    checked = [
         check
         for part in export.printed
         if part.step
@@ -252,3 +255,14 @@ def part_step_checks(
             part_checks.names_of(part_checks.CHECKS, part.step), partial(compared, part)
         )
     ]
+    return checked + guarded([COUPONS], lambda: [_coupon_check(export, files)])
+
+
+def _coupon_check(export: Export, files: dict[str, StepFile | Unknown]) -> Check:
+    """The coupons have a seat, which is a hollow sphere, for each size to try and each offset."""
+    base = export.spec.prototype.base
+    radii = np.round(require(export.prototype, "").balls.body_radius_mm, SIZE_DIGITS)
+    wanted = min(base.coupon_sizes, len(np.unique(radii))) * len(base.coupon_offsets_mm)
+    coupons = [part for part in export.printed if part.name.startswith(COUPON)]
+    seats = sum(int(known(files[part.name]).faces.inward.sum()) for part in coupons)
+    return at_most(COUPONS, abs(seats - wanted), 0, f"{seats} seats, the spec asks for {wanted}")

@@ -18,7 +18,7 @@ from tbcad_verify.mesh.mesh import (
 )
 from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.stl import Facets
-from tbcad_verify.mesh.vectors import norm
+from tbcad_verify.mesh.vectors import cross, distances_to_segments, dot, norm, unit
 from tbcad_verify.record.prototype_sections import PrintedPart
 from tbcad_verify.report.checks import (
     Check,
@@ -119,12 +119,18 @@ def distance_to_facets(point: Floats, mesh: Mesh, facets: Ints) -> float:
 
     Facets without area are left out: their edges are their neighbours' too.
     """
-    from trimesh.triangles import closest_point
-
     solid = facets[norm(mesh.area[:, facets]) > 0]
-    triangles = mesh.points[mesh.faces[solid]]
-    nearest = closest_point(triangles, np.broadcast_to(point, (len(triangles), 3)))
-    return float(np.linalg.norm(nearest - point, axis=1).min(initial=np.inf))
+    normal, corner = (
+        unit(mesh.area[:, solid]),
+        mesh.points[mesh.faces[solid]].T - point[:, None, None],
+    )
+    distance, above = np.full(solid.size, np.inf), np.ones(solid.size, dtype=np.bool_)
+    for k in range(3):
+        start, end = corner[:, k], corner[:, (k + 1) % 3]
+        above &= dot(cross(normal, end - start), start) <= 0
+        distance = np.minimum(distance, distances_to_segments(np.zeros((3, 1)), start, end))
+    distance[above] = np.abs(dot(normal, corner[:, 0]))[above]
+    return float(distance.min(initial=np.inf))
 
 
 def manifold(points: Floats, faces: Any) -> Any:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, Va
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.record.files import AGAIN, FileBytes
-from tbcad_verify.record.validation import allowed, array, fault, shown
+from tbcad_verify.record.validation import array, fault, shown
 from tbcad_verify.types import Bools, Floats, Ints
 
 FIRST_ROW = 2  # its line in the file, below the header line
@@ -113,7 +113,7 @@ def numbers_or_empty(least: float, most: float) -> Any:
 
 Counts = Annotated[
     Ints,
-    column(Annotated[str, Field(pattern="^[0-9]{1,9}$"), allowed("a whole number")], np.int64),
+    column(Annotated[str, Field(pattern="^[0-9]{1,9}$")], np.int64),
 ]
 Texts = Annotated[NDArray[np.str_], column(Annotated[str, Field(max_length=WIDEST)], np.str_)]
 

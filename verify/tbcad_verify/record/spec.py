@@ -118,6 +118,10 @@ class BaseSpec(Strict):
     dowel_mm: float = Field(ge=1, le=10)
     dowel_press_mm: float = Field(ge=-0.5, le=1)
     dowel_slip_mm: float = Field(ge=0, le=1)
+    coupon_offsets_mm: list[Annotated[float, Field(ge=-1, le=1)]] = Field(
+        min_length=1, max_length=9
+    )
+    coupon_sizes: int = Field(ge=1, le=99)
 
 
 class MotionSpec(Strict):

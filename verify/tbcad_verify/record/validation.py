@@ -15,7 +15,6 @@ from pydantic import (
     Field,
     GetPydanticSchema,
     ValidationError,
-    WithJsonSchema,
 )
 from pydantic_core import ErrorDetails, core_schema
 
@@ -25,13 +24,6 @@ from tbcad_verify.types import Floats
 
 FARTHEST_MM = 1e6  # of any point in a JSON file from the origin
 SHOWN = 60  # characters of a refused value that are shown
-_KINDS = {"boolean": "true or false", "null": "none", "object": "an object"}
-_LIMITS = {
-    "exclusiveMinimum": "above {:g}",
-    "minimum": "from {:g}",
-    "exclusiveMaximum": "below {:g}",
-    "maximum": "to {:g}",
-}
 
 
 class Strict(BaseModel):
@@ -55,11 +47,6 @@ def _in_the_folder(name: str) -> str:
     return name
 
 
-def allowed(words: str) -> WithJsonSchema:
-    """What errors say is allowed, in place of what follows from a type's limits."""
-    return WithJsonSchema({"allowed": words})
-
-
 def array(items: Any, build: Callable[[list[Any]], Any] = np.array) -> GetPydanticSchema:
     """Validate a list as this type, and make an array of it."""
     return GetPydanticSchema(
@@ -69,33 +56,14 @@ def array(items: Any, build: Callable[[list[Any]], Any] = np.array) -> GetPydant
     )
 
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,64}$"), allowed("letters, digits and _")]
-PlainFile = Annotated[
-    str,
-    Field(pattern=r"^[^/\\:\x00]{1,255}$"),
-    AfterValidator(_in_the_folder),
-    allowed("a plain file name"),
-]
-FileOrNone = Annotated[
-    str,
-    Field(pattern=r"^[^/\\:\x00]{0,255}$"),
-    AfterValidator(_in_the_folder),
-    allowed("a plain file name, or empty text"),
-]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,64}$")]
+PlainFile = Annotated[str, Field(pattern=r"^[^/\\:\x00]{1,255}$"), AfterValidator(_in_the_folder)]
+FileOrNone = Annotated[str, Field(pattern=r"^[^/\\:\x00]{0,255}$"), AfterValidator(_in_the_folder)]
 _Length = Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)]
-_Three = Annotated[list[_Length], Field(min_length=3, max_length=3), allowed("three numbers")]
+_Three = Annotated[list[_Length], Field(min_length=3, max_length=3)]
 Vector = Annotated[Floats, array(_Three)]
 """Three numbers, (3,)."""
-Matrix = Annotated[
-    Floats,
-    array(
-        Annotated[
-            list[_Three],
-            Field(min_length=3, max_length=3),
-            allowed("three rows of three numbers"),
-        ]
-    ),
-]
+Matrix = Annotated[Floats, array(Annotated[list[_Three], Field(min_length=3, max_length=3)])]
 """Three rows of three numbers, (3, 3)."""
 
 
@@ -173,53 +141,16 @@ def _described(model: type[BaseModel], error: ErrorDetails, place: str) -> str:
         return _unknown(model, str(error["loc"][0]))
     if error["type"] == "value_error":
         return f"{place} {error['ctx']['error']}".strip()
-    value = "missing" if error["type"] == "missing" else shown(error["input"])
-    return f"{place} is {value}, allowed is {_allowed_at(model, error['loc'])}"
+    if error["type"] == "missing":
+        return f"{place} is missing"
+    message = error["msg"].replace("Input should", "it should")
+    return f"{place} is {shown(error['input'])}: {message}"
 
 
 def _unknown(model: type[BaseModel], key: str) -> str:
     likely = get_close_matches(key, model.model_fields, 1)
     hint = f"did you mean {likely[0]}? " if likely else ""
     return f"unknown key {shown(key)}: {hint}allowed are {', '.join(model.model_fields)}"
-
-
-def _allowed_at(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
-    whole = model.model_json_schema()
-    node = whole
-    for part in location:
-        node = whole["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
-        if isinstance(part, int):
-            inner = node["prefixItems"][part] if "prefixItems" in node else node.get("items")
-        else:
-            inner = node.get("properties", {}).get(part, node.get("additionalProperties"))
-        if not isinstance(inner, dict):
-            break
-        node = inner
-    return _words(node)
-
-
-def _words(node: dict[str, Any]) -> str:
-    """A JSON schema in words."""
-    if "allowed" in node:
-        return str(node["allowed"])
-    constants = node.get("enum", [node["const"]] if "const" in node else [])
-    if choices := [*map(shown, constants), *map(_words, node.get("anyOf", ()))]:
-        return " or ".join(filter(None, (", ".join(choices[:-1]), choices[-1])))
-    kind = node.get("type", "object")
-    limits = [words.format(node[key]) for key, words in _LIMITS.items() if key in node]
-    if kind in ("number", "integer"):
-        name = {"number": "a number" if limits else "a finite number", "integer": "a whole number"}
-        return " ".join([name[kind], *limits])
-    if kind == "string":
-        return f"text that matches {node['pattern']}" if "pattern" in node else "text"
-    return _list_words(node) if kind == "array" else _KINDS.get(kind, kind)
-
-
-def _list_words(node: dict[str, Any]) -> str:
-    least, most = node.get("minItems", 0), node.get("maxItems")
-    count = f"{least}" if least == most else f"{least} to {most}" if most else f"{least} or more"
-    inner = node.get("items") or (node.get("prefixItems") or [{}])[0]
-    return f"a list of {count}, each {_words(inner)}"
 
 
 def refuse_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -181,13 +181,11 @@ def _requirements(name: CheckName, export: Export) -> Check:
 
 
 def _part_files(name: CheckName, export: Export) -> Check:
-    """Every part has a mesh, and where any has more a solid and a 3MF, all called as it is."""
-    parts = (*export.parts, *export.mandrels, *export.printed)
-    kinds = KINDS if any(part.step or part.threemf for part in parts) else {"stl": ".stl"}
+    """Every part has a mesh, a solid and a 3MF, all called as it is."""
     wrong = [
         f"{part.name} has {getattr(part, kind) or 'none'} for {part.name}{suffix}"
-        for part in parts
-        for kind, suffix in kinds.items()
+        for part in (*export.parts, *export.mandrels, *export.printed)
+        for kind, suffix in KINDS.items()
         if getattr(part, kind) != part.name + suffix
     ]
     return at_most(name, len(wrong), 0, short_list(wrong))

@@ -2,13 +2,15 @@
 
 Rays start at the valleys between mirrors and leave through the back, along the normal of the
 ellipsoid. The facets that they meet say how far the back is beyond the ellipsoid, the valleys how
-deep the mirrors reach; the wall is what is left between, as long as a ray needs for it.
+deep the mirrors reach; the wall is what is left between, as long as a ray needs for it. Between the
+deepest valley and the back is nothing, and beyond the back nothing but flanges: so every corner of
+the casing away from joining faces and flanges is on the back, and so are its facets' middles.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +38,7 @@ from tbcad_verify.types import Bools, Floats
 # Corners of facets are on the exact surfaces, but for float32: its rounding comes on top.
 WALL_MM, SIZE_MM, PLACE_MM = 1e-3, 1e-3, 2e-3
 ROUNDINGS = 8
+CHORDS = 2.0  # maximum distance of a facet's middle from the back, of the mesh's largest error
 SQUARE_COS = math.cos(math.radians(30))  # of a ray and the back's normal; a joining face has less
 LIFT_MM = 1e-3  # by which rays start below the valley
 NOT_MEASURED = "holes were not looked for: see the checks of printers"
@@ -57,14 +60,13 @@ class MeshCasing:
     semi_axes: Floats  # of the camera's ellipsoid along its axis and across it, (2,) mm
     deepest: float  # by how much the ellipsoid must grow to hold all valleys, mm
     beyond: float  # by how much to be the back, mm: half of its corners are within
-    nearest: float  # the same, where the back is nearest
+    ends: tuple[float, float]  # the same, where the back is nearest and farthest
 
-    def walls(self) -> tuple[float, float]:
-        """Material behind the deepest valley where the back is nearest, and otherwise, mm."""
-        return (
-            least_wall(self.semi_axes, self.deepest, self.nearest),
-            least_wall(self.semi_axes, self.deepest, self.beyond),
-        )
+    def walls(self) -> list[float]:
+        """Material behind the deepest valley: as usual, where the back is nearest, and farthest."""
+        return [
+            least_wall(self.semi_axes, self.deepest, more) for more in (self.beyond, *self.ends)
+        ]
 
 
 def casing_checks(setup: OpticalSetup, holes: Mapping[str, RoundHoles]) -> list[Check]:
@@ -99,8 +101,39 @@ def measure_casing(setup: OpticalSetup, number: int) -> MeshCasing:
     if not back.size:
         raise Unknown("no ray from a valley between mirrors leaves through a back")
     deepest = float(growth(semi_axes, camera, valleys.point).max())
-    beyond = growth(semi_axes, camera, back)
-    return MeshCasing(semi_axes, deepest, float(np.median(beyond)), float(beyond.min()))
+    beyond = float(np.median(growth(semi_axes, camera, back)))
+    more = _back_wall(setup, number, lambda point: growth(semi_axes, camera, point) - beyond)
+    if export.spec.shell.edges == "pedestal":  # whose walls end at the deepest valley
+        more = more[more > deepest - beyond + ROUNDINGS * rounding(setup.mesh)]
+    ends = beyond + float(more.min(initial=0)), beyond + float(more.max(initial=0))
+    return MeshCasing(semi_axes, deepest, beyond, ends)
+
+
+def _back_wall(setup: OpticalSetup, number: int, far: Callable[[Floats], Floats]) -> Floats:
+    """How far each corner of the casing but of flanges is beyond the back, mm, and each middle.
+
+    A middle's chord error is taken off, as far as it is allowed.
+
+    `far`: of points (3, N), mm.
+    """
+    mesh, export, label = setup.mesh, setup.export, setup.recovery.segments.label
+    blur = ROUNDINGS * rounding(mesh)
+    facets = mesh.faces[(setup.part[label] == number) & (setup.owner()[label] < 0)]
+    heights = mesh.points[:, [0, 2]] - [0, export.foot_z_mm]
+    flanges = export.spec.shell.seam_flange, export.spec.shell.foot_flange
+    thick = np.array([flange.thickness_mm for flange in flanges])
+    corner = np.unique(facets)
+    distance = np.zeros(len(mesh.points))
+    distance[corner] = far(mesh.points[corner].T)
+    flat = (np.abs(heights) <= blur).any(axis=1)
+    in_flange = (np.abs(heights) <= thick + blur).any(axis=1) & (distance >= -blur)
+    free = corner[~(flat | in_flange)[corner]]
+    on_back = (np.abs(distance) <= WALL_MM)[facets].all(axis=1)
+    level = (np.abs(heights)[facets] <= thick + blur).all(axis=1).any(axis=1)
+    middles = far(mesh.points[facets[on_back & ~level]].mean(axis=1).T)
+    allowed = CHORDS * export.mesh_error_mm
+    chords = np.minimum(middles + allowed, 0) + np.maximum(middles - allowed, 0)
+    return np.concatenate([distance[free], chords])
 
 
 def _of_part(setup: OpticalSetup, number: int, round_holes: RoundHoles | None) -> list[Check]:

@@ -13,6 +13,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Mapping
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,7 +25,7 @@ SOLID, PRODUCT, FACE = "MANIFOLD_SOLID_BREP", "PRODUCT", "ADVANCED_FACE"
 SHAPES = {"ADVANCED_BREP_SHAPE_REPRESENTATION", "SHAPE_REPRESENTATION"}
 DEPTH = 2  # of references by which forms of the same look differ
 NAMED = ("shell_", "mandrel_")  # products whose faces have names
-POINT = "'centrepoint'"
+POINT = "'centre point'"
 RATIONAL = re.compile(r"\(BOUNDED_(?:CURVE|SURFACE)\(\)B_SPLINE_[^']*REPRESENTATION_ITEM\(''\)\)")
 
 
@@ -45,23 +46,34 @@ def refuse_foreign(table: StepTable) -> None:
     rules = _rules()
     if not _form("", rules["header"]).pattern.fullmatch("".join(table.head.split())):
         raise ValueError(f"the header is none of tbcad's: {table.head[:SHOWN]!r}")
-    found = {number: _matched(number, *entity) for number, entity in table.entities.items()}
+    bodies, found, count = table.bodies, {}, Counter[str]()
+    for kind, every in table.numbered.items():
+        numbers = every
+        if kind in rules["geometry"]:
+            count[kind] += len(every)
+            nameless = ("",) if kind == FACE else ("''", POINT)
+            numbers = [one for one in every if not bodies[one].startswith(nameless)]
+        found |= {one: _matched(one, kind, bodies[one]) for one in numbers}
     names = {number: {form.name for form, _ in forms} for number, forms in found.items()}
     for _ in range(DEPTH):
         for number, forms in found.items():
-            names[number] = {form.name for form, places in forms if _fits(names, form, places)}
+            names[number] = {form.name for form, at in forms if _fits(table, names, form, at)}
             if not names[number]:
                 allowed = " or ".join(", ".join(form.places) for form, _ in forms)
                 raise ValueError(f"#{number}, {forms[0][0].name}, refers to others than {allowed}")
-    _refuse_counts(table, Counter(name for some in names.values() for name in some))
+    count.update(chain.from_iterable(names.values()))
+    _refuse_counts(table, count)
 
 
-def _fits(names: Mapping[int, set[str]], form: Form, places: tuple[str, ...]) -> bool:
+def _fits(
+    table: StepTable, names: Mapping[int, set[str]], form: Form, places: tuple[str, ...]
+) -> bool:
     """Whether what is at the places are references, each once, to what they may refer to."""
     for allowed, text in zip(form.places, places, strict=True):
         numbers = [int(one) for one in re.findall(r"\d+", text)] if allowed else []
         kinds = SHAPES if allowed == "SHAPE" else {allowed}
-        if len(set(numbers)) < len(numbers) or any(not names[k] & kinds for k in numbers):
+        others = (names[k] if k in names else {table.kinds[k]} for k in numbers)
+        if len(set(numbers)) < len(numbers) or any(not some & kinds for some in others):
             return False
     return True
 
@@ -101,10 +113,6 @@ def _product(table: StepTable, occurrence: int) -> str:
 
 def _matched(number: int, kind: str, body: str) -> list[tuple[Form, tuple[str, ...]]]:
     """The forms that an entity may have, and what is at their places."""
-    if kind in _geometry():
-        plain = kind == FACE or body.lstrip().startswith("''")
-        if plain or "".join(body.split()).startswith(POINT):
-            return [(_geometry()[kind], ())]
     text = f"{kind}({''.join(body.split())})"
     forms = [(form, form.pattern.fullmatch(text)) for form in _forms().get(kind, ())]
     if found := [(form, match.groups()) for form, match in forms if match]:
@@ -116,11 +124,6 @@ def _matched(number: int, kind: str, body: str) -> list[tuple[Form, tuple[str, .
 @cache
 def _rules() -> dict[str, Any]:
     return tomllib.loads(Path(__file__).with_name("forms.toml").read_text(encoding="utf-8"))
-
-
-@cache
-def _geometry() -> dict[str, Form]:
-    return {kind: Form(kind, "", PLACE, ()) for kind in _rules()["geometry"]}
 
 
 @cache

@@ -1,8 +1,9 @@
 """Entities of a STEP file's text (ISO 10303-21), read without any CAD kernel.
 
 What one kernel writes and reads can be wrong both times. Names, spheres, planes, holes and
-validation properties are therefore taken from the text. A shell has 30,000 entities, of which the
-verification needs a fifth: references and numbers are searched for in the text of those.
+validation properties are therefore taken from the text. An entity must be written as a build has
+it, `#1 = NAME(...);` with a line's end. A shell has 30,000, of which the verification needs a
+fifth: references and numbers are searched for in the text of those.
 """
 
 from __future__ import annotations
@@ -17,12 +18,13 @@ from tbcad_verify.types import Floats
 
 # No expression tries again what it has read, so that the time grows with the length alone.
 TEXT = r"'(?:[^']++|'')*+'"
+# An entity, or all that is left where none is.
 ENTITY = re.compile(
-    rf"\s*+#(\d{{1,15}}+)\s*+=\s*+([A-Z]\w*+)?\s*+\(((?:[^';=]++|{TEXT})*+);",
+    rf"#(\d{{1,15}}+) ?= ?([A-Z]\w*+)?\(((?:[^';]*+{TEXT})*+[^';]*)\);\n|((?s:.++))",
 )
 START = re.compile(r"\s*+ISO-10303-21;\s*+HEADER;")
-HEADER_END = re.compile(rf"{TEXT}|(?P<end>ENDSEC;\s*+DATA;)|(?P<open>')")
-END = re.compile(r"\s*+ENDSEC;\s*+END-ISO-10303-21;\s*+")
+HEADER_END = re.compile(rf"{TEXT}|(?P<end>ENDSEC;\s*+DATA;\n)|(?P<open>')")
+END = re.compile(r"ENDSEC;\s*+END-ISO-10303-21;\s*+")
 LABEL = re.compile(TEXT)
 REFERENCE = re.compile(r"#(\d+)")
 NUMBER = re.compile(r"[-+]?(?<!\d)\d++\.\d*+(?:E[-+]?\d++)?")  # begins at none but the first digit
@@ -43,9 +45,10 @@ class StepTable:
 
     Attributes:
         head: text before the first of them.
-        entities: name, empty for complex ones (units), and text of the parameters of each.
+        numbered: numbers of the entities of each kind, in the order of the file; of complex ones
+            (units), the kind is empty.
         kinds: name of each, but for complex ones.
-        bodies: text of its parameters.
+        bodies: text of the parameters of each.
     """
 
     def __init__(self, text: str) -> None:
@@ -53,17 +56,29 @@ class StepTable:
 
         ValueError: the text is no STEP file, or two entities have one number.
         """
+        plain = LABEL.sub("", text)
+        if "/*" in plain:
+            raise ValueError("broken STEP text: a comment")
         start = _data_start(text)
-        self.head, self.entities = text[:start], _entities(text, start)
-        entities = self.entities
-        self.kinds = {number: kind for number, (kind, _) in entities.items() if kind}
-        self.bodies = {number: body for number, (kind, body) in entities.items() if kind}
+        *entities, (_, _, _, rest) = ENTITY.findall(text, start) or [("", "", "", "")]
+        if not END.fullmatch(rest):
+            raise ValueError(f"broken STEP text at {rest[:SHOWN].strip()!r}")
+        if plain.count("(") != plain.count(")"):
+            raise ValueError("broken STEP text: a bracket too many")
+        self.head = text[:start]
+        self.bodies = {int(number): body for number, _, body, _ in entities}
+        self.kinds = {int(number): kind for number, kind, _, _ in entities if kind}
+        if len(self.bodies) < len(entities):
+            raise ValueError("broken STEP text: two entities have one number")
+        self.numbered: dict[str, list[int]] = {}
+        for number, (_, kind, _, _) in zip(self.bodies, entities, strict=True):
+            self.numbered.setdefault(kind, []).append(number)
         self._references: dict[int, list[int]] = {}
         self._topology: dict[int, list[int]] = {}
 
     def of(self, kind: str) -> list[int]:
         """Numbers of all entities of a kind, in the order of the file."""
-        return [number for number, one in self.kinds.items() if one == kind]
+        return self.numbered.get(kind, [])
 
     def label(self, number: int) -> str:
         """First text of an entity: its name."""
@@ -101,6 +116,19 @@ class StepTable:
                 seen.update(new)
                 todo += new
 
+    def vertices(self, face: int) -> list[int]:
+        """Numbers of the vertices of a face's edges, each at least once."""
+        *bounds, _ = self.references(face)
+        loops = [loop for bound in bounds for loop in self.references(bound)]
+        return [vertex for loop in loops for vertex in self._of_loop(loop)]
+
+    def _of_loop(self, loop: int) -> list[int]:
+        inside = self.references(loop)
+        if self.kinds[loop] == "VERTEX_LOOP":
+            return inside
+        edges = [edge for oriented in inside for edge in self.references(oriented)]
+        return [vertex for edge in edges for vertex in self.references(edge)[:2]]
+
     def _but_geometry(self, number: int) -> list[int]:
         if number not in self._topology:
             kinds = self.kinds
@@ -120,25 +148,6 @@ class StepTable:
         """Origin and axis of a placement."""
         point, axis = self.references(number)[:2]
         return self.triple(point), self.triple(axis)
-
-
-def _entities(text: str, place: int) -> dict[int, tuple[str, str]]:
-    """Name and text of the parameters of each entity from a place on."""
-    if "/*" in text:
-        raise ValueError("broken STEP text: a comment")
-    numbers = 0
-    entities: dict[int, tuple[str, str]] = {}
-    while (match := ENTITY.match(text, place)) and (inside := match[3].rstrip()).endswith(")"):
-        plain = LABEL.sub("", inside)
-        if plain.count("(") + 1 != plain.count(")"):
-            break
-        numbers, place = numbers + 1, match.end()
-        entities[int(match[1])] = (match[2] or "", inside[:-1])
-    if not END.fullmatch(text, place):
-        raise ValueError(f"broken STEP text at {text[place : place + SHOWN].strip()!r}")
-    if len(entities) < numbers:
-        raise ValueError("broken STEP text: two entities have one number")
-    return entities
 
 
 def _data_start(text: str) -> int:

@@ -169,14 +169,11 @@ def _colours(table: StepTable) -> Iterator[tuple[int, tuple[float, ...]]]:
 
 
 def _solid(table: StepTable, solid: int, colour: tuple[float, ...]) -> TextSolid:
-    reached = list(table.reached(solid))
-    points = [
-        table.triple(table.references(one)[0])
-        for one in reached
-        if table.kinds.get(one) == "VERTEX_POINT"
-    ]
+    every = [face for shell in table.references(solid) for face in table.references(shell)]
+    vertices = {one for face in every for one in table.vertices(face)}
+    points = [table.triple(table.references(one)[0]) for one in vertices]
     corners = np.array(points).reshape(-1, 3)
-    faces = [round_face(table, one) for one in reached if table.kinds.get(one) == "ADVANCED_FACE"]
+    faces = [round_face(table, one) for one in reversed(every)]
     order = np.lexsort(corners.T[::-1])
     return TextSolid(corners[order], tuple(face for face in faces if face), colour)
 
@@ -188,11 +185,8 @@ def round_face(table: StepTable, face: int) -> RoundFace | None:
     if kind is None:
         return None
     point, axis = table.placement(table.references(surface)[0])
-    places = [
-        float((table.triple(table.references(one)[0]) - point) @ axis)
-        for one in table.reached(face)
-        if table.kinds.get(one) == "VERTEX_POINT"
-    ]
+    ends = np.array([table.triple(table.references(one)[0]) for one in table.vertices(face)])
+    places = ((ends - point) @ axis).tolist()
     radius = table.numbers(surface)[-1]
     return RoundFace(kind, point, axis, radius, not table.forward(face), (min(places), max(places)))
 

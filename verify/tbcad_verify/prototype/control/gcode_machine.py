@@ -17,6 +17,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -73,22 +74,28 @@ def parse_program(text: str) -> tuple[list[Line], list[str]]:
     lines: list[Line] = []
     faults: list[str] = []
     for number, line in enumerate(text.split("\n")[:-1], 1):
-        found = LINE.fullmatch(line)
-        if not found or not line or len(line) > MAX_LINE_LENGTH:
-            faults.append(f"line {number} is none that a plan has: {line[:MAX_LINE_LENGTH]!r}")
-            continue
-        says = _said(found["comment"]) if found["comment"] else {}
-        if says is None:
-            faults.append(f"line {number} has a comment that no plan has")
-            continue
-        words = WORD.findall(found["command"] or "")
-        code = "".join(words[0]) if words else ""
-        # The other G words of the one line that sets modes are fixed by the grammar.
-        values = {letter: float(value) for letter, value in words[1:] if letter != "G"}
-        lines.append(Line(number, code, values, says))
+        try:
+            lines.append(Line(number, *_parsed(line)))
+        except ValueError as error:
+            faults.append(f"line {number} {error}")
     if not text.endswith("\n"):
         faults.append("the last line is cut")
     return lines, faults
+
+
+@lru_cache
+def _parsed(line: str) -> tuple[str, dict[str, float], dict[str, float]]:
+    """Code, values and comment of a line. ValueError: no plan has it. Most lines come often."""
+    found = LINE.fullmatch(line)
+    if not found or not line or len(line) > MAX_LINE_LENGTH:
+        raise ValueError(f"is none that a plan has: {line[:MAX_LINE_LENGTH]!r}")
+    says = _said(found["comment"]) if found["comment"] else {}
+    if says is None:
+        raise ValueError("has a comment that no plan has")
+    words = WORD.findall(found["command"] or "")
+    code = "".join(words[0]) if words else ""
+    # The other G words of the one line that sets modes are fixed by the grammar.
+    return code, {letter: float(value) for letter, value in words[1:] if letter != "G"}, says
 
 
 def _said(comment: str) -> dict[str, float] | None:
@@ -298,8 +305,12 @@ class Machine:
         return ""
 
 
+@lru_cache(maxsize=1)
 def run_program(text: str, switch: float = math.nan, homed: float = math.nan) -> Machine:
-    """Run a program; homing finds the switch at one base angle and ends at another, degrees."""
+    """Run a program; homing finds the switch at one base angle and ends at another, degrees.
+
+    Several checks ask for the same run.
+    """
     return run_lines(*parse_program(text), switch, homed)
 
 

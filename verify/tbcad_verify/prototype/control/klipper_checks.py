@@ -2,8 +2,8 @@
 
 Klipper obeys all that it reads: an include, a macro with the name of a command, a section twice. So
 both texts are read by closed grammars, and the program is run by the same machine. The
-configuration has no line but those that tbcad writes, in their order; pins are the user's, their
-inversions are not.
+configuration has no line but those that tbcad writes, in their order; pins are the user's, each for
+one purpose, their inversions are not.
 Sources: idle_timeout.py, stepper_enable.py and static_digital_output.py of Klipper: without
 [idle_timeout], or without its gcode, M84 comes after 600 s at rest; a shutdown takes the enable_pin
 of a stepper back, and leaves a static output as it is.
@@ -13,8 +13,10 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from itertools import zip_longest
 
 from tbcad_verify.prototype.context import PrototypeContext
@@ -50,14 +52,14 @@ FORMS = {
     }.items()
 }
 SECOND_MS, MINUTE_S = 1000.0, 60.0
-PIN = r"[\w.:]+"
+PIN, OPEN = r"[\w.:]+", "FILL_IN"
 CONFIG = (
     "# base of the prototype: degrees for millimetres; fill in the pins of the board",
     "# zero pin in before RESTART, FIRMWARE_RESTART or the supply's switch: they let it fall",
     *(r"\[printer\]", "kinematics: none", "max_velocity: 1000", "max_accel: 1000"),
-    *(r"\[pause_resume\]", r"\[respond\]", r"\[idle_timeout\]", r"timeout: \d+", "gcode:"),
+    *(r"\[pause_resume\]", r"\[respond\]", r"\[idle_timeout\]", "timeout: 86400", "gcode:"),
     r'    RESPOND MSG="idle, the motor stays on"',
-    *(r"\[static_digital_output base_enable\]", rf"pins: !?{PIN}", r"\[manual_stepper base\]"),
+    *(r"\[static_digital_output base_enable\]", f"pins: {PIN}", r"\[manual_stepper base\]"),
     # Normally closed to ground: pulled up, high when pressed.
     *(rf"step_pin: {PIN}", rf"dir_pin: {PIN}", rf"endstop_pin: \^{PIN}"),
 )
@@ -96,13 +98,10 @@ def run_klipper(text: str, axis: str, switch: float, homed: float) -> Machine:
     lines, faults = [Line(0, "G21", {}, {})], []
     said, enabled = dict[str, float](), False
     for number, line in enumerate(text.splitlines(), 1):
-        found = next(
-            ((m, code) for form, code in FORMS.items() if (m := form.fullmatch(line))), None
-        )
-        if found is None:
+        if (found := _parsed(line)) is None:
             faults.append(f"line {number} is none that a plan has")
             continue
-        told, code = numbers(found[0]), found[1]
+        told, code = found
         enabled |= code == "ENABLE"
         if code == "$H" and not enabled:
             faults.append(f"line {number} homes before the motor is on")
@@ -114,11 +113,19 @@ def run_klipper(text: str, axis: str, switch: float, homed: float) -> Machine:
         elif code != "ENABLE":
             scale = {"F": MINUTE_S} | ({"P": 1 / SECOND_MS} if code == "G4" else {})
             values = {name: value * scale.get(name, 1.0) for name, value in told.items()}
-            values |= {axis: values.pop("X")} if "X" in values else {}
+            if "X" in values:
+                values[axis] = values.pop("X")
             # Pins wait for the motion, as moves do.
             lines += [Line(number, "G4", {"P": 0.0}, {})] * code.startswith(("M6", "M8", "M9"))
             lines.append(Line(number, code, values, told))
     return run_lines([*lines, Line(len(lines), "M2", {}, {})], faults, switch, homed)
+
+
+@lru_cache
+def _parsed(line: str) -> tuple[dict[str, float], str] | None:
+    """The numbers that a line tells, and its code; most lines come often."""
+    found = ((form.fullmatch(line), code) for form, code in FORMS.items())
+    return next(((numbers(match), code) for match, code in found if match), None)
 
 
 def config_faults(context: PrototypeContext, ratio: float) -> Iterator[str]:
@@ -132,6 +139,10 @@ def config_faults(context: PrototypeContext, ratio: float) -> Iterator[str]:
         if line is None or form is None or not _fits(line, form):
             yield f"{KLIPPER_CONFIG}: {line or 'its end'!r}, allowed is {form or 'its end'!r}"
             return
+    pins = re.findall(rf"pins?: \^?({PIN})$", text, re.MULTILINE)
+    for pin, count in Counter(pins).items():
+        if count > 1 and pin != OPEN:
+            yield f"{KLIPPER_CONFIG}: pin {pin} is there {count} times, each is for one purpose"
 
 
 def _steps(context: PrototypeContext, ratio: float) -> Iterator[tuple[str, float]]:
