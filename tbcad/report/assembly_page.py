@@ -89,7 +89,7 @@ def write_page(
 
 def page(machine: AssembledMachine, steps: Sequence[Step], pictures: Mapping[str, bytes]) -> str:
     """The page as HTML; pictures: PNG files by keys of steps."""
-    what = {int(row["item"] or 0): str(row["what"]) for row in machine.rows}
+    what = {int(row["item"] or 0): str(row["what"]) for row in machine.bill.rows}
     body = (
         "<h1>Assembly</h1>",
         *(f"<p>{escape(text)}</p>" for text in ABOUT),
@@ -112,7 +112,7 @@ def page(machine: AssembledMachine, steps: Sequence[Step], pictures: Mapping[str
 
 def _tools(machine: AssembledMachine) -> Iterator[str]:
     """What is needed beside the parts of the list."""
-    kinds = {machine.kind(part) for part in machine.items}
+    kinds = {machine.kind(part) for part in machine.bill.items}
     yield from TOOLS
     yield from (tool for kind, tool in TOOLS_OF_KINDS.items() if kind in kinds)
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from tbcad.core.geometry.primitives import (
     Component,
+    Cylinder,
     Primitive,
     Prism,
     box,
@@ -27,15 +28,16 @@ from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.purchased import (
+from tbcad.prototype.frame.shared import (
     CLEARANCE_HOLE_MM,
     OVERLAP_MM,
     THROUGH_MM,
-    Bracket,
     level_prism,
     webs,
 )
+from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.records.prototype import CameraTravel
 from tbcad.types import Floats
@@ -74,14 +76,10 @@ SLOT_SIDE_MM, SLOT_INNER_MM, SLOT_OUTER_MM = 9.0, 20.0, 14.0  # from the foot's 
 AXIAL = 1e-6  # largest part of the camera's direction out of the frame's plane
 
 
-@dataclass(frozen=True)
-class CameraMount:
-    """The parts that hold the camera."""
+@dataclass(frozen=True, kw_only=True)
+class CameraMount(Mounted):
+    """The bracket on the base plate, the camera's plate on three screws, and the fence on that."""
 
-    bracket: Bracket  # on the base plate
-    plate: Component  # for the camera, on three screws
-    fence: Component  # on the plate, below the camera
-    fasteners: tuple[Fastener, ...]  # of them, without the screws in the base plate
     travel: CameraTravel  # how far the camera moves to either side
 
 
@@ -179,19 +177,23 @@ class _Place:
         return slot(start, self.own[along], 2 * travel, M5_HOLE_MM / 2, depth)
 
 
-def camera_mount(spec: PrototypeSpec, axes: Floats, camera: Camera, parts: Parts) -> CameraMount:
-    """Bracket, plate and fence for a camera; axes (3, 3) are the frame's, as rows.
+def camera_mount(site: Site, _: FrameLayout) -> CameraMount | None:
+    """Bracket, plate and fence for a camera, and its body; None without a camera.
 
     SpecError when the camera does not look along the frame's plane, its thread lies beyond its end,
     or camera or mount reach the base plate.
     """
-    place = _Place(spec, axes, camera, parts[INSERT])
+    spec, camera, parts = site.spec.prototype, site.layout.array.camera, site.parts
+    if not spec.camera_diameter_mm:
+        return None
+    place = _Place(spec, site.axes, camera, parts[INSERT])
     _check_camera(place)
+    body = Cylinder(camera.pinhole, -camera.forward, place.radius, spec.camera_length_mm)
     play = float(np.degrees(np.arctan((M5_HOLE_MM - M5_MM) / spec.frame.flange_mm)))
     return CameraMount(
-        bracket=_bracket(place),
-        plate=_plate(place),
-        fence=_fence(place),
+        brackets=(_bracket(place),),
+        printed=(_plate(place), _fence(place)),
+        purchased=(Component("camera", "camera behind its pinhole", (body,)),),
         fasteners=_fasteners(place, parts),
         travel=CameraTravel(
             along_axis_mm=place.along,
@@ -371,3 +373,37 @@ def _check_camera(place: _Place) -> None:
             f"the camera reaches down to {lowest:.0f} mm, below the base plate: make "
             f"prototype.frame.floor_mm less than {lowest:.0f}"
         )
+
+
+@planned(
+    "Bracket, plate and fence of the camera",
+    *("camera_bracket", "camera_plate", "camera_fence", "camera"),
+)
+def camera_step(machine: AssembledMachine) -> Words:
+    """The camera's mount."""
+    does = [
+        "Press the inserts into the camera plate from behind.",
+        "Bracket on the base plate with washers, in the middle of its slots.",
+        "Three long screws with washers from behind through the bracket's slots; on each between "
+        "bracket and plate a washer and two nuts, then into the plate's inserts. "
+        f"{GAP_MM:g} mm between plate and bracket. The nut at the plate locks the screw, the other "
+        "one clamps the bracket.",
+        "Camera and lens are not in the list: camera.json has what they must do, and tbcad camera "
+        "shows which on sale do it.",
+        "Fence on the plate. Then your camera on the plate by its tripod thread, its back against "
+        "the fence.",
+    ]
+    checks = [
+        f"The gap between plate and bracket is {GAP_MM:g} mm at all three screws, to 0.5 mm.",
+        "The camera looks at the object, and cannot be turned on its screw by hand.",
+    ]
+    return does, checks
+
+
+CAMERA = Part(
+    (camera_step,),
+    camera_mount,
+    remedies={
+        "camera*": "prototype.frame.camera_screw_mm larger or prototype.camera_diameter_mm smaller",
+    },
+)

@@ -4,7 +4,7 @@ It is a plate across the axis with a tube for the bearings, held by a flange on 
 webs between plate and flange leave space for tube and motor.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,31 +18,36 @@ from tbcad.core.geometry.primitives import (
 )
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import FrameSpec
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.base.fasteners import m3_insert
 from tbcad.prototype.base.hub import PIN_OUT_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.purchased import (
-    CLEARANCE_HOLE_MM,
+from tbcad.prototype.frame.driven import (
     COUPLING_MM,
+    STAGE_HEIGHT_MM,
+    ShaftParts,
+    motor_fasteners,
+    motor_screw_places,
+    purchased_components,
+    wheel_radius,
+)
+from tbcad.prototype.frame.shared import (
+    CLEARANCE_HOLE_MM,
+    GAP_MM,
     HALF_FLANGE_MM,
     OVERLAP_MM,
     PLATE_MM,
-    STAGE_HEIGHT_MM,
     THROUGH_MM,
+    BearingHead,
     HeadPlate,
-    ShaftParts,
     axial_cylinder,
     drilled_holes,
     hub_point,
     level_prism,
-    motor_fasteners,
-    motor_screw_places,
     on_uprights,
-    purchased_components,
     webs,
-    wheel_radius,
 )
 from tbcad.prototype.homing import (
     MARK_DEPTH_MM,
@@ -53,12 +58,12 @@ from tbcad.prototype.homing import (
     bracket_screws,
     tab_radius,
 )
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part
+from tbcad.prototype.part import Part
+from tbcad.prototype.purchased.parts import Parts, choose_part
 from tbcad.types import Floats
 
 # Behind the head of a rotary stage's screw (M6, ISO 4762): room for it, and the length of its key.
 M6_HEAD_MM, HEAD_PLAY_MM, KEY_ROOM_MM = 10.0, 0.5, 95.0
-GAP_MM = 5.0  # between what turns and the plate: the heads of the wheel's screws are in it
 RELIEF_MM = 0.3  # round a bearing, where it passes
 SHOULDER_MM = 3.0  # width of the shoulder behind a bearing
 TUBE_WALL_MM = 6.0  # of the tube round the bearings
@@ -73,20 +78,6 @@ ABOVE_MM, BELOW_MM = 55.0, 30.0  # of the flange beyond the axis and the plate's
 SCREW_EDGE_MM = 10.0  # from the flange's ends to its screws
 PILOT_PLAY_MM = 0.2
 WINDOW_PLAY_MM, WINDOW_BEYOND_MM = 1.0, 20.0  # round a motor on the axis, and behind it
-
-
-@dataclass(frozen=True)
-class BearingHead:
-    """The head of the frame."""
-
-    component: Component  # the printed part
-    plate: HeadPlate  # across the axis
-    purchased: tuple[Component, ...]  # what is in it: bearings, shaft, collar, wheels, motor
-    fasteners: tuple[Fastener, ...]  # that hold it and the motor, and the inserts in its side
-    rear: float  # coordinate of the tube's end along w, from the origin, mm
-    shaft: PurchasedPart | None  # in the bearings, if any
-    face: float  # level coordinate of the flange's face on the uprights, mm
-    top: float  # height of the flange's upper end, mm
 
 
 def bearing_head(
@@ -124,7 +115,7 @@ def bearing_head(
         (w, -w, axes[0], -axes[0], axes[1]),
     )
     return BearingHead(
-        component=component,
+        printed=(component,),
         plate=plate,
         purchased=purchased_components(base, drive, plate, shaft_parts),
         fasteners=(
@@ -140,6 +131,7 @@ def bearing_head(
                 for out in bracket_screws()
             ),
         ),
+        listed=shaft_parts.listed if shaft_parts else {},
         rear=shaft_parts.rear if shaft_parts else plate.back,
         shaft=shaft_parts.shaft if shaft_parts else None,
         face=face,
@@ -265,3 +257,29 @@ def _motor_holes(
         low = np.array([plate.back - motor["length_mm"] - WINDOW_BEYOND_MM, -size, -size])
         holes.append(box(low, np.array([plate.back, size, size]), base.frame))
     return holes
+
+
+@planned("Bearing head on the uprights", "bearing_*")
+def head_step(machine: AssembledMachine) -> Words:
+    """Bearings and head."""
+    bearings = machine.has("bearing_front")
+    seat = "Press a bearing into either side of the head, until it sits on its shoulder."
+    turns = "The shaft slides through both bearings by hand and turns without a rough spot."
+    does = [
+        "Press the inserts into the head's side.",
+        when(bearings, seat),
+        "Screw the head on the uprights with the T-nuts, its upper edge flush with their ends.",
+    ]
+    checks = [
+        "A straight edge across both uprights' ends touches the head.",
+        when(bearings, turns),
+    ]
+    return does, checks
+
+
+HEAD = Part(
+    (head_step,),
+    lambda site, _: bearing_head(
+        site.spec.prototype.frame, site.base, site.drive, site.axes, site.parts
+    ),
+)

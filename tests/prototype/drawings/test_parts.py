@@ -7,12 +7,12 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from tbcad.prototype.drawings.parts import LAMP, PLATE, UPRIGHT, WHEEL, Listed, sheets
 
 from tbcad.cad.drafting.dimensions import labels
 from tbcad.cad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet
 from tbcad.cad.formats.entities import Circle, Dimension, Layer, Line, Text, simple
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drawings.parts import LAMP, PLATE, UPRIGHT, WHEEL, Listed, sheets
 from tbcad.prototype.drive.drive import load_drives
 from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.prototype.purchased.parts import load_parts

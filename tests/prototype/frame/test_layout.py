@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tbcad.prototype.frame.purchased import frame_axes
 
 from tbcad.core.geometry.primitives import Component, Cylinder
 from tbcad.core.geometry.vectors import norm
@@ -17,7 +18,6 @@ from tbcad.prototype.base.split import UNCUT
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.frame.head import BearingHead, bearing_head
 from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
-from tbcad.prototype.frame.purchased import frame_axes
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
 from tbcad.prototype.purchased.parts import choose_part, load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_layout

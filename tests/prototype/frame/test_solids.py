@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from OCP.TopoDS import TopoDS_Shape
+from tbcad.prototype.frame.purchased import CLEARANCE_HOLE_MM
 
 from tbcad.cad.kernel.checks import volume
 from tbcad.core.geometry.vectors import norm
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.frame.layout import SLOT_DEPTH_MM, FrameLayout
-from tbcad.prototype.frame.purchased import CLEARANCE_HOLE_MM
 from tbcad.prototype.printed import component_solid
 from tests.helpers import cylinders
 from tests.prototype.conftest import SMALL

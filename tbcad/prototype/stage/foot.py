@@ -1,4 +1,4 @@
-"""Parts on the base plate: feet of the uprights, clamp of the post."""
+"""The clamp of the stage's post on the base plate, and how the stage is put together."""
 
 import numpy as np
 
@@ -8,35 +8,16 @@ from tbcad.core.geometry.primitives import (
     Primitive,
     box,
     cylinder_between,
-    rectangle,
 )
-from tbcad.core.spec.prototype import FrameSpec
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.purchased import (
-    CLEARANCE_HOLE_MM,
-    EXTRUSION_MM,
-    HALF_FLANGE_MM,
-    OVERLAP_MM,
-    THROUGH_MM,
-    Bracket,
-    drilled_holes,
-    level_prism,
-    on_uprights,
-    webs,
-)
+from tbcad.prototype.frame.shared import CLEARANCE_HOLE_MM, THROUGH_MM, drilled_holes
+from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import Parts, choose_screw
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.types import Floats
 
-M5_HOLE_MM = CLEARANCE_HOLE_MM[5.0]
 M5_HEAD_MM = 8.5
-
-# Feet of the uprights.
-FOOT_HEIGHT_MM, FOOT_DEPTH_MM = 50.0, 48.0
-FOOT_WEB_MM = 15.0  # from the middle to the webs
-FOOT_SCREW_MM = 13.0  # from the foot's ends to its screws
-WEB_SETBACK_MM = 4.0  # of webs from the ends of their flanges
-
 # Clamp of the post.
 COLLAR_HEIGHT_MM, COLLAR_WALL_MM = 34.0, 8.0  # of the collar round the post, from the plate
 SLIT_MM = 2.0
@@ -53,55 +34,9 @@ CHANNEL_WIDTH_MM, CHANNEL_HEIGHT_MM = 6.0, 4.5
 CHANNEL_ROOF_MM = 3.0  # material above the channel
 
 
-def upright_foot(spec: FrameSpec, axes: Floats, face: float, side: int, parts: Parts) -> Bracket:
-    """A foot on the front (side 1) or the back (side -1) of both uprights.
-
-    face is the level coordinate of the uprights' front; axes (3, 3) are the frame's, as rows.
-    """
-    low, thick, half = spec.floor_mm, spec.flange_mm, spec.uprights_mm / 2 + HALF_FLANGE_MM
-    start = face if side > 0 else face - EXTRUSION_MM
-
-    def at(depth: float, height: float) -> tuple[float, float]:
-        return start + side * depth, low + height
-
-    def plate(depth: float, height: float) -> Primitive:
-        (x0, z0), (x1, z1) = at(0.0, 0.0), at(depth, height)
-        return level_prism(rectangle((min(x0, x1), z0), (max(x0, x1), z1)), -half, half, axes)
-
-    inside = thick - OVERLAP_MM
-    corners = np.array(
-        [
-            at(inside, inside),
-            at(FOOT_DEPTH_MM - WEB_SETBACK_MM, inside),
-            at(inside, FOOT_HEIGHT_MM - WEB_SETBACK_MM),
-        ]
-    )
-    added = [plate(thick, FOOT_HEIGHT_MM), plate(FOOT_DEPTH_MM, thick)]
-    added += webs(corners, FOOT_WEB_MM, spec.web_mm, axes)
-    screw, _ = at(FOOT_DEPTH_MM - FOOT_SCREW_MM, 0.0)
-    _, height = at(0.0, FOOT_HEIGHT_MM - FOOT_SCREW_MM)
-    across = (-spec.uprights_mm / 2, spec.uprights_mm / 2)
-    under = [np.array([screw, y, low]) @ axes for y in across]
-    in_uprights = [np.array([start, y, height]) @ axes for y in across]
-    removed = drilled_holes(under, thick * axes[2], M5_HOLE_MM)
-    removed += drilled_holes(in_uprights, side * thick * axes[0], M5_HOLE_MM)
-    component = Component(
-        "upright_foot_front" if side > 0 else "upright_foot_back",
-        "foot of the uprights",
-        tuple(added),
-        tuple(removed),
-        (-axes[2], -side * axes[0]),
-    )
-    ends = (start, start + side * FOOT_DEPTH_MM)
-    foot = np.array([[x, y] for x in ends for y in (-half, half)])
-    in_plate = np.array([[screw, y] for y in across])
-    inward = -side * axes[0]
-    fasteners = on_uprights(component.name, in_uprights, inward, thick, parts)
-    return Bracket(component, in_plate, foot, fasteners)
-
-
-def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, parts: Parts) -> Bracket:
+def stage_foot(site: Site, _: FrameLayout) -> Mounted:
     """A clamp round the post, with a channel for the wires below."""
+    spec, axes, stage = site.spec.prototype.frame, site.axes, site.stage
     low, radius, up = spec.floor_mm, stage.sizes.post + COLLAR_WALL_MM, axes[2]
     ear, top = radius + EAR_LENGTH_MM, low + COLLAR_HEIGHT_MM
     # Screws on the diagonals clear the collar, and beside the ears these.
@@ -125,12 +60,12 @@ def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, parts: Parts) 
     width = CHANNEL_WIDTH_MM / 2
     height = min(CHANNEL_HEIGHT_MM, spec.flange_mm - CHANNEL_ROOF_MM)
     channel = np.array([-width, -half - THROUGH_MM, low - THROUGH_MM])
-    clamp, fasteners = _clamp(axes, stage, ear, top, parts)
+    clamp, fasteners = _clamp(axes, stage, ear, top, site.parts)
     removed = (
         Cylinder(middle, up, stage.sizes.post + spec.post_play_mm / 2, COLLAR_HEIGHT_MM),
         Cylinder(base - THROUGH_MM * up, up, wire, COLLAR_HEIGHT_MM),
         *clamp,
-        *drilled_holes(places, spec.flange_mm * up, M5_HOLE_MM),
+        *drilled_holes(places, spec.flange_mm * up, CLEARANCE_HOLE_MM[5.0]),
         box(channel, np.array([width, 0.0, low + height]), axes),
     )
     component = Component(
@@ -141,7 +76,7 @@ def stage_foot(spec: FrameSpec, axes: Floats, stage: StageLayout, parts: Parts) 
         (-up, up),
     )
     foot = np.array([[-half, -half], [end, half]])
-    return Bracket(component, holes, foot, fasteners)
+    return Mounted(brackets=(Bracket(component, holes, foot, fasteners),))
 
 
 def _clamp(
@@ -170,3 +105,39 @@ def _clamp(
         Fastener(screw, (middle - side) @ axes, axes[1], name),
         Fastener(insert, (middle + side) @ axes, -axes[1], name),
     )
+
+
+@planned("Object stage", "stage_*", loose=("WIRE-28", "WIRE-30"))
+def stage_step(machine: AssembledMachine) -> Words:
+    """The object's stage with its LEDs; x is toward the camera, y to its right as it looks back."""
+    leds = machine.record.leds
+    does = [
+        when(
+            leds,
+            f"Solder two wires to each of the {len(leds)} LEDs, long one to anode, and mark the "
+            "anode. Push the LEDs into the crown's pockets from below, wires through the grooves "
+            "and the bore.",
+        ),
+        f"{when(leds, 'Wires through the post. ')}Crown into the post, set screw through the "
+        "post's wall.",
+        "Press the insert into the foot's ear. Foot on the plate with washers; clamp the post in "
+        f"it{', turned so that the LEDs stand as the checks say.' if leds else '.'}",
+        "Lay the disc on the crown's studs.",
+    ]
+    checks = [
+        "The disc lies flat, comes off by hand and fits turned by 180 degrees.",
+        *(
+            f"LED {number}: {abs(x):.0f} mm {'toward' if x > 0 else 'away from'} the camera, "
+            f"{abs(y):.0f} mm to the {'right' if y > 0 else 'left'} as the camera sees it, "
+            f"{abs(z):.0f} mm {'above' if z > 0 else 'below'} the object's centre."
+            for number, (x, y, z) in enumerate((led.position_mm for led in leds), 1)
+        ),
+        "The post does not turn in its clamp."
+        + when(leds, " A plug on the wires lets it be taken out."),
+        "The base passes the stage without touching it, over its whole travel by hand; then the "
+        "zero pin is in again.",
+    ]
+    return does, checks
+
+
+STAGE = Part((stage_step,), stage_foot, remedies={"stage_foot": "prototype.frame.floor_mm less"})
