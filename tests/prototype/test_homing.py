@@ -16,8 +16,9 @@ from tbcad.prototype.drive.balance import (
     home_angles,
     stop_sequence,
 )
-from tbcad.prototype.frame.layout import FrameLayout
-from tbcad.prototype.homing import homing_layout
+from tbcad.prototype.frame.shared import BearingHead
+from tbcad.prototype.homing import HomingLayout, homing_layout
+from tbcad.prototype.part import FrameLayout
 from tbcad.prototype.printed import component_solid
 from tbcad.prototype.purchased.parts import load_parts
 
@@ -45,8 +46,9 @@ def test_no_room_below_the_first_stop(small_prototype: PrototypeLayout) -> None:
 def test_the_parts_are_solids_and_a_swing_may_leave_no_room_for_the_tab(
     frame: FrameLayout, carrier: BaseLayout
 ) -> None:
-    for component in (frame.homing.disc, frame.homing.bracket, frame.homing.switch):
+    homing = frame.of(HomingLayout)
+    for component in (homing.disc, *homing.printed, *homing.purchased):
         assert component_solid(component)
     whole = HomeAngles(-170.0, -168.0, 345.0)
     with pytest.raises(SpecError, match="no room for the tab"):
-        homing_layout(carrier, frame.head.plate, whole, PARTS)
+        homing_layout(carrier, frame.of(BearingHead).plate, whole, PARTS)

@@ -5,14 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tbcad.prototype.drawings.caps import cap_sheet
 
 from tbcad.cad.formats.entities import Text
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.balls.selection import ball_candidates
-from tbcad.prototype.base.caps import SHARES, cap_limits
+from tbcad.prototype.base.caps import SHARES, cap_limits, cap_sheet
 from tbcad.prototype.base.layout import base_layout
 
 CAPTURE_MM = 60.0
