@@ -38,7 +38,7 @@ from tbcad.prototype.drive.balance import (
     sum_masses,
 )
 from tbcad.prototype.drive.drive import Drive, base_torques, choose_drive, load_drives
-from tbcad.prototype.electronics import Wiring, wiring_layout
+from tbcad.prototype.electronics import led_circuit
 from tbcad.prototype.fasteners import Fastener, numbered
 from tbcad.prototype.frame.layout import frame_layout
 from tbcad.prototype.frame.stock import Stock
@@ -63,7 +63,6 @@ class PrototypeModel(Site):
     split: BaseSplit  # how the carrier is cut to fit the bed
     # of what turns with the base; the carrier's mass is an estimate until it is built
     balance: BaseBalance
-    wiring: Wiring  # of lamp and LEDs
     frame: FrameLayout  # layout of what holds stage, base and camera
     shroud: ShroudLayout | None  # round the rig, None without
     printed: "tuple[PrintedPart, ...]" = ()  # all printed parts, when they are built
@@ -87,7 +86,6 @@ class PrototypeModel(Site):
         counts = Counter(one.part.name for one in self.fasteners)
         for one in self.frame.mounted:
             counts.update(one.listed)
-        counts.update(self.wiring.purchased(self.frame.find(LampLayout)))
         if self.shroud:
             counts[self.shroud.sheet.name] += self.shroud.sheets
         return counts
@@ -182,7 +180,7 @@ def _frame_attempts(
             yield chosen, error
             return False
         try:
-            chosen, stage, wiring = _staged(chosen, layout, keep_out, parts)
+            chosen, stage = _staged(chosen, layout, keep_out, parts)
         except SpecError as error:  # whatever the boss
             yield chosen, error
             return True
@@ -196,7 +194,7 @@ def _frame_attempts(
             parts=parts,
         )
         try:
-            arrangement = _arranged(site, estimate[0], wiring)
+            arrangement = _arranged(site, estimate[0])
         except SpecError as error:
             yield chosen, error
         else:
@@ -207,12 +205,13 @@ def _frame_attempts(
 
 def _staged(
     spec: Spec, layout: PrototypeLayout, keep_out: KeepOut, parts: Parts
-) -> tuple[Spec, StageLayout, Wiring]:
+) -> tuple[Spec, StageLayout]:
     """The stage, without LEDs where those in the automatic places cannot be used or wired."""
     section = spec.prototype.stage
     try:
         stage = stage_layout(spec.prototype, layout, keep_out, parts)
-        return spec, stage, wiring_layout(spec.prototype, stage, parts)
+        led_circuit(spec.prototype, stage, parts)
+        return spec, stage
     except SpecError:
         if not section.leds_mm or section.leds_mm != led_places(spec.optics.capture_diameter_mm):
             raise
@@ -238,7 +237,7 @@ def _keep_out(spec: Spec, layout: PrototypeLayout, base: BaseLayout) -> KeepOut:
     return keep_out_volume(layout, base, spec.optics.capture_diameter_mm / 2, approach)
 
 
-def _arranged(site: Site, balance: BaseBalance, wiring: Wiring) -> PrototypeModel:
+def _arranged(site: Site, balance: BaseBalance) -> PrototypeModel:
     spec, frame = site.spec, frame_layout(site)
     shroud, lamps = shroud_round(site, frame), frame.find(LampLayout)
     lamp_z = float(lamps.places[0, 2]) if lamps else 0.0
@@ -247,7 +246,7 @@ def _arranged(site: Site, balance: BaseBalance, wiring: Wiring) -> PrototypeMode
         "spec": _with(spec, light=spec.prototype.light.model_copy(update=light)),
         "split": split_base(site.base, spec.printer),
     }
-    return PrototypeModel(**known, balance=balance, wiring=wiring, frame=frame, shroud=shroud)
+    return PrototypeModel(**known, balance=balance, frame=frame, shroud=shroud)
 
 
 def shroud_round(site: Site, frame: FrameLayout) -> ShroudLayout | None:

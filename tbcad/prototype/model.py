@@ -27,6 +27,7 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seat_solids import cap_parts
 from tbcad.prototype.base.solid import carrier_parts
 from tbcad.prototype.drive.balance import PointMasses
+from tbcad.prototype.electronics import Wiring
 from tbcad.prototype.frame.layout import frame_layout
 from tbcad.prototype.homing import HomingLayout
 from tbcad.prototype.printed import PlacedSolid, PrintedPart, Role, placed_components
@@ -103,7 +104,7 @@ def _model(arrangement: PrototypeModel, progress: Progress, submit: Submit) -> P
         *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in parts_of(coupons)),
         *_components("tool", frame.tools, on_tools),
     )
-    parts = arrangement.parts | arrangement.wiring.parts
+    parts = arrangement.parts | frame.of(Wiring).parts
     return replace(arrangement, balance=balance, parts=parts, printed=printed)
 
 

@@ -17,5 +17,5 @@ PARTS = (
     *(COUPON, STOCK, CARRIER, CAPS, FEET, HEAD, DRIVE, HOMING, LAMPS, STAGE, CAMERA),
     *(WIRING, ZERO, GAUGE, BALLS, SHROUD, FIRST),
 )
-FRAME = HEAD, FEET, STAGE, HOMING, CAMERA, LAMPS, GAUGE, STOCK
+FRAME = HEAD, FEET, STAGE, HOMING, CAMERA, LAMPS, WIRING, GAUGE, STOCK
 """Each is laid out beside those before it: the head first, the stock under all last."""

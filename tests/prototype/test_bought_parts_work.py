@@ -19,7 +19,7 @@ from tbcad.core.spec.load import load_spec
 from tbcad.prototype.arrangement import PrototypeModel, arrange
 from tbcad.prototype.drive.balance import free_base_angles
 from tbcad.prototype.drive.drive import BaseTorques, drive_loads, load_drives
-from tbcad.prototype.electronics import wiring_layout, wiring_rows
+from tbcad.prototype.electronics import Wiring, led_circuit
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import bom_rows
 from tbcad.prototype.files.controllers import controller_files
@@ -56,14 +56,13 @@ def model(request: pytest.FixtureRequest) -> PrototypeModel:
 
 
 def bought(model: PrototypeModel) -> Counter[str]:
-    parts = model.parts | model.wiring.parts
+    parts = model.parts | model.frame.of(Wiring).parts
     rows = bom_rows(model.layout, model.drive, model.purchased, (), 1.27, parts, Prices(()))
     return Counter({str(row["part"]): int(row["quantity"]) for row in rows})
 
 
 def wiring(model: PrototypeModel) -> dict[str, Row]:
-    rows = wiring_rows(model.wiring, model.frame.find(LampLayout), model.drive)
-    return {str(row["signal"]): row for row in rows}
+    return {str(row["signal"]): row for row in model.frame.of(Wiring).rows}
 
 
 def along(model: PrototypeModel, points: np.ndarray) -> np.ndarray:
@@ -124,11 +123,11 @@ def test_wiring_of_lamps_release_switch_and_motor(model: PrototypeModel) -> None
         apart = norm(np.diff(lamps.places, axis=0)).max()
         reach = 1000 + len(lamps.places[1:]) * apart
         assert float(rows["lamp"]["length_mm"]) >= reach
-    if model.wiring.wire:
-        weak = {model.wiring.wire.name: replace(model.wiring.wire, sizes=(0.5, 5.0))}
+    if circuit := model.frame.of(Wiring).circuit:
+        weak = {circuit.wire.name: replace(circuit.wire, sizes=(0.5, 5.0))}
         thick = {name: part for name, part in model.parts.items() if not name.startswith("WIRE-")}
         with pytest.raises(SpecError, match="wires of LEDs"):
-            wiring_layout(model.spec.prototype, model.stage, thick | weak)
+            led_circuit(model.spec.prototype, model.stage, thick | weak)
 
 
 def test_screws_reach_into_their_threads(model: PrototypeModel) -> None:

@@ -30,12 +30,11 @@ from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.prototype.assembly_steps.steps import mounting_record
 from tbcad.prototype.base.caps import cap_limits, cap_sheet
 from tbcad.prototype.drive.drive import base_torques, drive_loads
-from tbcad.prototype.electronics import wiring_rows
+from tbcad.prototype.electronics import Wiring
 from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
 from tbcad.prototype.files import bom, controllers, tables
 from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record
 from tbcad.prototype.frame.stock import Stock
-from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import pattern
 from tbcad.prototype.model import build_prototype_model
 from tbcad.prototype.printed import (
@@ -137,11 +136,7 @@ def _write_tables(built: PrototypeModel, folder: Path) -> None:
         ("rotation_plan.csv", tables.PICTURE_COLUMNS, tables.picture_rows(layout)),
         ("stops.csv", tables.STOP_COLUMNS, tables.stop_rows(layout, built.balance, loads)),
         ("plate_holes.csv", tables.HOLE_COLUMNS, tables.hole_rows(built.frame.of(Stock))),
-        (
-            "wiring.csv",
-            WiringRow.columns(),
-            wiring_rows(built.wiring, built.frame.find(LampLayout), built.drive),
-        ),
+        (WiringRow.FILE, WiringRow.columns(), built.frame.of(Wiring).rows),
     ):
         write_table(folder / name, columns, rows)
     texts = controllers.controller_files(
