@@ -25,9 +25,7 @@ from tbcad.prototype.balls.layout import (
 )
 from tbcad.prototype.base.caps import cap_magnets
 from tbcad.prototype.base.fasteners import base_fasteners
-from tbcad.prototype.base.holding import base_motion
-from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.prototype.base.mass import carrier_masses
+from tbcad.prototype.base.layout import BaseLayout, base_layout, carrier_masses
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.drive.balance import (
     OVERTRAVEL_DEG,
@@ -151,7 +149,7 @@ def _base_attempts(spec: Spec, layout: PrototypeLayout, parts: Parts) -> Iterato
         for angle in section.pad_angles_deg:
             chosen = _with_base(spec, hold=hold, pad_angle_deg=angle)
             try:
-                base_layout(chosen.prototype.base, layout, base_motion(chosen))
+                base_layout(chosen.prototype.base, layout)
             except SpecError as error:
                 yield chosen, error
             else:
@@ -171,7 +169,7 @@ def _frame_attempts(
     """
     for boss in spec.prototype.base.hub_bosses_mm:
         chosen = _with_base(spec, hub_boss_mm=boss)
-        base = base_layout(chosen.prototype.base, layout, base_motion(chosen))
+        base = base_layout(chosen.prototype.base, layout)
         carrier = carrier_masses(base, spec.printer.density_g_cm3)
         try:
             estimate = balance_and_drive(layout, base, carrier, chosen, parts)

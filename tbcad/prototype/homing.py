@@ -95,13 +95,13 @@ class HomingLayout(Mounted):
     error_deg: float  # largest error of angle zero from the play of rod and key
 
 
-def homing_layout(
-    base: BaseLayout, plate: HeadPlate, angles: HomeAngles, parts: Parts
-) -> HomingLayout:
+def homing_layout(site: Site, before: FrameLayout) -> HomingLayout:
     """Disc, bracket and switch for a base and the plate behind it.
 
     SpecError when the swing leaves no room for the tab.
     """
+    base, parts, plate = site.base, site.parts, before.of(BearingHead).plate
+    angles = home_angles(site.layout, site.spec.prototype.motion)
     place = _SwitchPlace.beside(base, plate)
     length = base.hub.face - plate.back + PIN_GRIP_MM
     hint = "add a longer one"
@@ -211,8 +211,8 @@ def _tab(place: _SwitchPlace, angles: HomeAngles) -> Floats:
 def _bracket(base: BaseLayout, plate: HeadPlate, place: _SwitchPlace) -> Component:
     """A block on the plate's side, as high as the disc, that the switch lies on."""
     near, far, side = plate.half_width, plate.half_width + BRACKET_MM, base.frame[2]
-    low = np.array([plate.back, BRACKET_LOW_MM, near])
-    body = box(low, np.array([place.low, BRACKET_HIGH_MM, far]), base.frame)
+    high = place.low, BRACKET_HIGH_MM, far
+    body = box((plate.back, BRACKET_LOW_MM, near), high, base.frame)
     removed: list[Primitive] = []
     for out in bracket_screws():
         middle = plate.back + (plate.front - plate.back) / 2
@@ -352,10 +352,5 @@ def zero_step(machine: AssembledMachine) -> Words:
     return does, checks
 
 
-def _layout(site: Site, before: FrameLayout) -> HomingLayout:
-    angles = home_angles(site.layout, site.spec.prototype.motion)
-    return homing_layout(site.base, before.of(BearingHead).plate, angles, site.parts)
-
-
-HOMING = Part((homing_step,), _layout)
+HOMING = Part((homing_step,), homing_layout)
 ZERO = Part((zero_step,))

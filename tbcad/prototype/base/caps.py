@@ -27,7 +27,7 @@ from tbcad.prototype.base.holding import (
     MIN_RATIO,
     REMANENCE_T,
     WIDER_GAP_MM,
-    Motion,
+    base_motion,
     force_needed,
     glue_force,
     pull_of_pair,
@@ -156,9 +156,10 @@ def _limits(spec: Spec, base: BaseLayout, prototype: PrototypeLayout, k: int) ->
     )
 
 
-def holding(base: BaseLayout, prototype: PrototypeLayout, motion: Motion, parts: Parts) -> Holding:
+def holding(base: BaseLayout, prototype: PrototypeLayout, parts: Parts) -> Holding:
     """What holds each ball in its seat, with the pads as they are turned, and assumptions."""
-    seats, masses = base.seats, ball_masses(prototype, motion.cap_density)
+    seats, motion = base.seats, base_motion(prototype.spec)
+    masses = ball_masses(prototype, motion.cap_density)
     needed = force_needed(
         seats.pad_normals, seats.axis, seats.centre, masses.mass_g, base.frame, motion
     ).tolist()

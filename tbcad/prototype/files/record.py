@@ -10,7 +10,6 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.arrangement import PrototypeModel
 from tbcad.prototype.base.caps import cap_limits, holding
-from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.drive.balance import BaseBalance, power_off, stop_sequence
 from tbcad.prototype.drive.drive import (
     HOLD_MARGIN,
@@ -70,7 +69,7 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         balls=BALLS_FILE,
         alternatives=layout.alternatives,
         seats=_seats(built),
-        holding=holding(built.base, layout, base_motion(built.spec), built.parts),
+        holding=holding(built.base, layout, built.parts),
         parts=tuple(map(_part, built.printed)),
         leds=tuple(
             records.Led(name=name, position_mm=(place + 0.0).tolist(), direction=way.tolist())

@@ -86,17 +86,13 @@ class CameraGauge(Mounted):
     errors: dict[str, float]
 
 
-def camera_gauge(
-    base: BaseLayout,
-    camera: Camera,
-    diameter: float,
-    needed: CameraRequirements,
-    swing: tuple[float, float],
-) -> CameraGauge:
-    """The gauge whose marks tell most of the pinhole's place.
-
-    diameter is that of the camera's body (mm), swing the smallest and largest base angle (radians).
-    """
+def camera_gauge(site: Site, before: FrameLayout) -> CameraGauge | None:
+    """The gauge whose marks tell most of the pinhole's place; None without a camera."""
+    if before.find(CameraMount) is None:
+        return None
+    base, camera, swing = site.base, site.layout.array.camera, site.layout.stops.range
+    needed = camera_requirements(site.layout.array, site.spec.optics.capture_diameter_mm / 2)
+    diameter = site.spec.prototype.camera_diameter_mm
     distance, pitch = float(norm(camera.pinhole)), camera.pixel_pitch
     sights = _sights(base, camera, diameter, needed)
     sight = min(sights, key=lambda one: max(place_errors(one, pitch, needed).values()))
@@ -207,7 +203,7 @@ def _component(base: BaseLayout, sizes: GaugeSizes) -> Component:
     )
     added = (
         *(
-            box(np.array([low, -half, level]), np.array([high, half, THICKNESS_MM]), axes)
+            box((low, -half, level), (high, half, THICKNESS_MM), axes)
             for half, low, high, level in blocks
         ),
         *(_far_end(sizes, side, axes) for side in (1, -1)),
@@ -271,13 +267,4 @@ def gauge_step(machine: AssembledMachine) -> Words:
     return does, checks, [fit]
 
 
-def _layout(site: Site, before: FrameLayout) -> CameraGauge | None:
-    if before.find(CameraMount) is None:
-        return None
-    array, spec = site.layout.array, site.spec
-    needed = camera_requirements(array, spec.optics.capture_diameter_mm / 2)
-    diameter = spec.prototype.camera_diameter_mm
-    return camera_gauge(site.base, array.camera, diameter, needed, site.layout.stops.range)
-
-
-GAUGE = Part((gauge_step,), _layout)
+GAUGE = Part((gauge_step,), camera_gauge)

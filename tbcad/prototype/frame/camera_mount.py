@@ -160,7 +160,7 @@ class _Place:
 
     def block(self, low: tuple[float, float, float], high: tuple[float, float, float]) -> Prism:
         """A box between two points of the camera's own axes."""
-        local = box(np.array(low), np.array(high), self.own)
+        local = box(low, high, self.own)
         return Prism(local.corners + self.camera.pinhole, local.along)
 
     def hole(self, back: float, across: float, out: tuple[float, float], size: float) -> Primitive:

@@ -1,7 +1,7 @@
 """What turns the base: motor, wheels, coupling, shaft and rotary stage in their places."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,8 +35,8 @@ from tbcad.prototype.frame.shared import (
     axial_cylinder,
     hub_point,
 )
-from tbcad.prototype.part import Part
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
+from tbcad.prototype.part import Part, Site
+from tbcad.prototype.purchased.parts import PurchasedPart, choose_screw
 from tbcad.prototype.sheets import ASIDE_MM, fitted, title_block
 
 if TYPE_CHECKING:
@@ -72,48 +72,58 @@ class ShaftParts:
 
 
 def purchased_components(
-    base: BaseLayout, drive: Drive, plate: HeadPlate, shaft_parts: ShaftParts | None
+    site: Site, plate: HeadPlate, shaft_parts: ShaftParts | None
 ) -> tuple[Component, ...]:
     """Simple bodies of all purchased parts of the head."""
+    base, drive = site.base, site.drive
     if drive.motor.kind == "stages":
         return _rotary_stage(base, drive.motor, plate)
-    components = [_motor(base, drive, plate)]
-    if drive.wheel and drive.pinion:
-        # The holes that are drilled into the wheel for the screws into the hub.
-        holes = _hub_screw_holes(base, drive.wheel["width_mm"], SCREW_MM)
-        components += [
-            _wheel("wheel", base, drive.wheel, 0.0, *holes, rotates=True),
-            _wheel("pinion", base, drive.pinion, drive.centre_mm),
-        ]
+    components, face = [_motor(base, drive, plate)], base.hub.mount
+    for name, part, out in (("wheel", drive.wheel, 0.0), ("pinion", drive.pinion, drive.centre_mm)):
+        if part:
+            # The holes that are drilled into the wheel for the screws into the hub.
+            holes = () if out else _hub_screw_holes(base, part["width_mm"], SCREW_MM)
+            ends, outer = (face, face - part["width_mm"]), 2 * wheel_radius(part)
+            ring = _ring(base, name, part, ends, (outer, part["bore_mm"]), holes, out)
+            components.append(replace(ring, rotates=not out))
     if drive.coupling:
         components.append(_coupling(base, drive.coupling))
     return (*components, *(_on_shaft(base, plate, shaft_parts) if shaft_parts else ()))
 
 
-def _hub_screw_holes(base: BaseLayout, length: float, diameter: float) -> list[Cylinder]:
+def _hub_screw_holes(base: BaseLayout, length: float, diameter: float) -> tuple[Cylinder, ...]:
     """Holes for the screws into the hub, through a body behind it."""
     start, end = base.hub.mount + THROUGH_MM, base.hub.mount - length - THROUGH_MM
-    return [
+    return tuple(
         cylinder_between(hub_point(base, start, x, y), hub_point(base, end, x, y), diameter / 2)
         for x, y in base.hub.holes.tolist()
-    ]
+    )
+
+
+def _ring(
+    base: BaseLayout,
+    name: str,
+    part: PurchasedPart,
+    ends: tuple[float, float],
+    diameters: tuple[float, float],
+    holes: tuple[Cylinder, ...] = (),
+    out: float = 0.0,
+) -> Component:
+    """A part about the axis, or out from it, by its ends along it, outer diameter and bore."""
+    (start, end), (outer, bore) = ends, diameters
+    body = axial_cylinder(base, start, end, outer / 2, out)
+    through = axial_cylinder(base, start + THROUGH_MM, end - THROUGH_MM, bore / 2, out)
+    return Component(name, part.what, (body,), (through, *holes), part=part.name)
 
 
 def _coupling(base: BaseLayout, part: PurchasedPart) -> Component:
     """A flange on the hub's face, and its collar, which keys of the flange's screws pass."""
     face = base.hub.mount
     flange = axial_cylinder(base, face, face - COUPLING_FLANGE_MM, part["flange_mm"] / 2)
-    end = face - COUPLING_MM + COUPLING_GAP_MM
-    collar = axial_cylinder(base, face, end, COUPLING_COLLAR_MM / 2)
-    bore = axial_cylinder(base, face + THROUGH_MM, end - THROUGH_MM, part["bore_mm"] / 2)
-    holes = (bore, *_hub_screw_holes(base, COUPLING_FLANGE_MM, part["hole_mm"]))
-    return Component("coupling", part.what, (flange, collar), holes, part=part.name, rotates=True)
-
-
-def _component(
-    name: str, part: PurchasedPart, body: Cylinder, *bores: Cylinder, rotates: bool = False
-) -> Component:
-    return Component(name, part.what, (body,), bores, part=part.name, rotates=rotates)
+    ends = face, face - COUPLING_MM + COUPLING_GAP_MM
+    holes = _hub_screw_holes(base, COUPLING_FLANGE_MM, part["hole_mm"])
+    ring = _ring(base, "coupling", part, ends, (COUPLING_COLLAR_MM, part["bore_mm"]), holes)
+    return replace(ring, added=(flange, *ring.added), rotates=True)
 
 
 def _on_shaft(base: BaseLayout, plate: HeadPlate, shaft_parts: ShaftParts) -> list[Component]:
@@ -122,35 +132,22 @@ def _on_shaft(base: BaseLayout, plate: HeadPlate, shaft_parts: ShaftParts) -> li
     front, rear, width = base.hub.socket, shaft_parts.rear, bearing["width_mm"]
     end = front - shaft["length_mm"]
     body = axial_cylinder(base, front, end, shaft["diameter_mm"] / 2)
-    components = [_component("shaft", shaft, body, rotates=True)]
-    for name, start in (("bearing_front", plate.front), ("bearing_rear", rear + width)):
-        stop = start - width
-        bore = axial_cylinder(base, start + THROUGH_MM, stop - THROUGH_MM, bearing["bore_mm"] / 2)
-        ring = axial_cylinder(base, start, stop, bearing["outer_mm"] / 2)
-        components.append(_component(name, bearing, ring, bore))
+    rings = [
+        _ring(base, name, bearing, (at, at - width), (bearing["outer_mm"], bearing["bore_mm"]))
+        for name, at in (("bearing_front", plate.front), ("bearing_rear", rear + width))
+    ]
     bore = axial_cylinder(base, rear + THROUGH_MM, end - SHAFT_END_MM, collar["bore_mm"] / 2)
     ring = axial_cylinder(base, rear, rear - collar["width_mm"], collar["outer_mm"] / 2)
-    return [*components, _component("collar", collar, ring, bore, rotates=True)]
+    return [
+        Component("shaft", shaft.what, (body,), part=shaft.name, rotates=True),
+        *rings,
+        Component("collar", collar.what, (ring,), (bore,), part=collar.name, rotates=True),
+    ]
 
 
 def wheel_radius(part: PurchasedPart) -> float:
     """Radius of a toothed wheel over its rims, mm."""
     return pitch_diameter(part) / 2 + PULLEY_RIM_MM
-
-
-def _wheel(
-    name: str,
-    base: BaseLayout,
-    part: PurchasedPart,
-    out: float,
-    *holes: Cylinder,
-    rotates: bool = False,
-) -> Component:
-    """A toothed wheel behind the hub's face, on the axis or out from it, and its other holes."""
-    start, end = base.hub.mount, base.hub.mount - part["width_mm"]
-    bore = axial_cylinder(base, start + THROUGH_MM, end - THROUGH_MM, part["bore_mm"] / 2, out)
-    body = axial_cylinder(base, start, end, wheel_radius(part), out)
-    return _component(name, part, body, bore, *holes, rotates=rotates)
 
 
 def _rotary_stage(
@@ -162,22 +159,19 @@ def _rotary_stage(
     top = axial_cylinder(base, start, end, radius)
     body = axial_cylinder(base, end - STAGE_GAP_MM, plate.front, radius)
     return (
-        _component("rotary_stage", stage, body),
+        Component("rotary_stage", stage.what, (body,), part=stage.name),
         Component("rotary_stage_top", "top of the rotary stage", (top,), rotates=True),
     )
 
 
 def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:
     """A motor behind the plate with its pilot and shaft."""
-    motor = drive.motor
-    half_width, out = motor["frame_mm"] / 2, drive.centre_mm
-    low = np.array([plate.back - motor["length_mm"], out - half_width, -half_width])
-    pilot = plate.back - OVERLAP_MM, plate.back + motor["pilot_height_mm"]
-    tip = plate.back + motor["shaft_length_mm"]
+    motor, out, back = drive.motor, drive.centre_mm, plate.back
+    half, pilot = motor["frame_mm"] / 2, (back - OVERLAP_MM, back + motor["pilot_height_mm"])
     added = (
-        box(low, np.array([plate.back, out + half_width, half_width]), base.frame),
+        box((back - motor["length_mm"], out - half, -half), (back, out + half, half), base.frame),
         axial_cylinder(base, *pilot, motor["pilot_mm"] / 2, out),
-        axial_cylinder(base, plate.back, tip, motor["shaft_mm"] / 2, out),
+        axial_cylinder(base, back, back + motor["shaft_length_mm"], motor["shaft_mm"] / 2, out),
     )
     return Component("motor", motor.what, added, part=motor.name)
 
@@ -191,11 +185,9 @@ def motor_screw_places(drive: Drive) -> list[tuple[float, float]]:
     return [(out, side) for out in (centre - half, centre + half) for side in (-half, half)]
 
 
-def motor_fasteners(
-    base: BaseLayout, drive: Drive, plate: HeadPlate, parts: Parts
-) -> Iterator[Fastener]:
+def motor_fasteners(site: Site, plate: HeadPlate) -> Iterator[Fastener]:
     """Screws through the head's plate into the motor behind it, or into the stage before it."""
-    w = base.frame[0]
+    base, drive, parts, w = site.base, site.drive, site.parts, site.base.frame[0]
     if drive.motor.kind == "motors":
         screw = choose_screw(parts, 3.0, PLATE_MM + MOTOR_THREAD_MM)
         start, along, body = plate.front, -w, "motor"

@@ -22,7 +22,6 @@ from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, plan
 from tbcad.prototype.base.fasteners import m3_insert
 from tbcad.prototype.base.hub import PIN_OUT_MM
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.driven import (
     COUPLING_MM,
@@ -58,7 +57,7 @@ from tbcad.prototype.homing import (
     bracket_screws,
     tab_radius,
 )
-from tbcad.prototype.part import Part
+from tbcad.prototype.part import FrameLayout, Part, Site
 from tbcad.prototype.purchased.parts import Parts, choose_part
 from tbcad.types import Floats
 
@@ -80,22 +79,21 @@ PILOT_PLAY_MM = 0.2
 WINDOW_PLAY_MM, WINDOW_BEYOND_MM = 1.0, 20.0  # round a motor on the axis, and behind it
 
 
-def bearing_head(
-    spec: FrameSpec, base: BaseLayout, drive: Drive, axes: Floats, parts: Parts
-) -> BearingHead:
-    """The head for a drive behind the base's hub; axes (3, 3) are the frame's, as rows.
+def bearing_head(site: Site, _: FrameLayout) -> BearingHead:
+    """The head for a drive behind the base's hub.
 
     SpecError when there is no bearing or shaft for the hub's bore, or the motor meets it.
     """
-    plate = _behind_disc(_head_plate(spec, base, drive), base, axes)
-    shaft_parts = _shaft_parts(base, plate, parts) if drive.belt else None
+    spec, base, axes, parts = site.spec.prototype.frame, site.base, site.axes, site.parts
+    plate = _behind_disc(_head_plate(site), base, axes)
+    shaft_parts = _shaft_parts(base, plate, parts) if site.drive.belt else None
     edge = axes @ hub_point(base, plate.back, plate.low)
     face = float(edge[0] + OVERLAP_MM - spec.flange_mm)
     low, top = float(edge[2]) - BELOW_MM, float(edge[2]) + ABOVE_MM - plate.low
-    corner = np.array([plate.front, plate.high, plate.half_width])
-    body = box(np.array([plate.back, plate.low, -plate.half_width]), corner, base.frame)
-    added = [body, *_flange(spec, base, plate, axes, (face, low, top))]
-    removed = _motor_holes(spec, base, drive, plate)
+    corner = plate.front, plate.high, plate.half_width
+    body = box((plate.back, plate.low, -plate.half_width), corner, base.frame)
+    added = [body, *_flange(site, plate, (face, low, top))]
+    removed = _motor_holes(site, plate)
     removed += _zero_holes(base, plate)
     sides = (-spec.uprights_mm / 2, spec.uprights_mm / 2)
     heights = (low + SCREW_EDGE_MM, top - SCREW_EDGE_MM)
@@ -117,10 +115,10 @@ def bearing_head(
     return BearingHead(
         printed=(component,),
         plate=plate,
-        purchased=purchased_components(base, drive, plate, shaft_parts),
+        purchased=purchased_components(site, plate, shaft_parts),
         fasteners=(
             *on_uprights(component.name, screws, -axes[0], spec.flange_mm, parts),
-            *motor_fasteners(base, drive, plate, parts),
+            *motor_fasteners(site, plate),
             *(
                 Fastener(
                     insert,
@@ -147,7 +145,8 @@ def _behind_disc(plate: HeadPlate, base: BaseLayout, axes: Floats) -> HeadPlate:
     return replace(plate, low=min(plate.low, float(low)))
 
 
-def _head_plate(spec: FrameSpec, base: BaseLayout, drive: Drive) -> HeadPlate:
+def _head_plate(site: Site) -> HeadPlate:
+    spec, base, drive = site.spec.prototype.frame, site.base, site.drive
     reach, face, half_webs = drive.centre_mm, base.hub.mount, WEB_MM + spec.web_mm + WEB_EDGE_MM
     if drive.wheel and drive.belt:
         half_motor = drive.motor["frame_mm"] / 2 + spec.belt_travel_mm / 2
@@ -180,15 +179,9 @@ def _shaft_parts(base: BaseLayout, plate: HeadPlate, parts: Parts) -> ShaftParts
     return ShaftParts(bearing, shaft, collar, rear, bearing["outer_mm"] / 2 + TUBE_WALL_MM)
 
 
-def _flange(
-    spec: FrameSpec,
-    base: BaseLayout,
-    plate: HeadPlate,
-    axes: Floats,
-    at: tuple[float, float, float],
-) -> list[Primitive]:
+def _flange(site: Site, plate: HeadPlate, at: tuple[float, float, float]) -> list[Primitive]:
     """Flange with its face at a level coordinate, between two heights, and its webs."""
-    face, low, top = at
+    spec, base, axes, (face, low, top) = site.spec.prototype.frame, site.base, site.axes, at
     half = spec.uprights_mm / 2 + HALF_FLANGE_MM
     front, inside = face + spec.flange_mm, face + spec.flange_mm - OVERLAP_MM
     flange = level_prism(rectangle((face, low), (front, top)), -half, half, axes)
@@ -205,8 +198,8 @@ def _zero_holes(base: BaseLayout, plate: HeadPlate) -> list[Primitive]:
     """Hole of the zero pin and mark beside it; inserts for the bracket of the switch."""
     spec, through = base.spec, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
     pin = hub_point(base, plate.back - THROUGH_MM, PIN_OUT_MM)
-    mark = np.array([plate.front - MARK_DEPTH_MM, PIN_OUT_MM, -MARK_MM / 2])
-    end = np.array([plate.front + THROUGH_MM, MARK_END_MM, MARK_MM / 2])
+    mark = plate.front - MARK_DEPTH_MM, PIN_OUT_MM, -MARK_MM / 2
+    end = plate.front + THROUGH_MM, MARK_END_MM, MARK_MM / 2
     holes: list[Primitive] = [cylinder_between(pin, pin + through, PIN_HOLE_MM / 2)]
     holes.append(box(mark, end, base.frame))
     middle, deep = plate.front - PLATE_MM / 2, plate.half_width - spec.insert_depth_mm
@@ -233,10 +226,9 @@ def _seats(
     ]
 
 
-def _motor_holes(
-    spec: FrameSpec, base: BaseLayout, drive: Drive, plate: HeadPlate
-) -> list[Primitive]:
+def _motor_holes(site: Site, plate: HeadPlate) -> list[Primitive]:
     """Pilot and screws: slots along the plate for a belt, a window for a motor on the axis."""
+    spec, base, drive = site.spec.prototype.frame, site.base, site.drive
     motor, depth = drive.motor, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
     start = plate.back - THROUGH_MM
     places = [hub_point(base, start, out, side) for out, side in motor_screw_places(drive)]
@@ -254,8 +246,8 @@ def _motor_holes(
     holes += [slot(place, base.frame[1], travel, screw, depth) for place in places]
     if not drive.belt:
         size = motor["frame_mm"] / 2 + WINDOW_PLAY_MM
-        low = np.array([plate.back - motor["length_mm"] - WINDOW_BEYOND_MM, -size, -size])
-        holes.append(box(low, np.array([plate.back, size, size]), base.frame))
+        low = plate.back - motor["length_mm"] - WINDOW_BEYOND_MM, -size, -size
+        holes.append(box(low, (plate.back, size, size), base.frame))
     return holes
 
 
@@ -277,9 +269,4 @@ def head_step(machine: AssembledMachine) -> Words:
     return does, checks
 
 
-HEAD = Part(
-    (head_step,),
-    lambda site, _: bearing_head(
-        site.spec.prototype.frame, site.base, site.drive, site.axes, site.parts
-    ),
-)
+HEAD = Part((head_step,), bearing_head)

@@ -169,8 +169,8 @@ def _uprights(site: Site, head: BearingHead) -> tuple[PurchasedPart, float, list
     half, uprights = EXTRUSION_MM / 2, []
     for name, sign in (("upright_left", 1), ("upright_right", -1)):
         y = sign * spec.uprights_mm / 2
-        low = np.array([head.face - EXTRUSION_MM, y - half, spec.floor_mm])
-        body = box(low, np.array([head.face, y + half, head.top]), axes)
+        low = head.face - EXTRUSION_MM, y - half, spec.floor_mm
+        body = box(low, (head.face, y + half, head.top), axes)
         what = f"{part.what}, cut to {length:.1f} mm"
         slots = _slots(part["slot_mm"], (head.face - half, y), (spec.floor_mm, head.top), axes)
         uprights.append(Component(name, what, (body,), slots, part=part.name))
@@ -208,7 +208,7 @@ def _plate(site: Site, brackets: Sequence[Bracket]) -> tuple[PurchasedPart, Comp
     part = min(candidates, key=lambda plate: plate["length_mm"] * plate["width_mm"])
     half = np.array([part["length_mm"], part["width_mm"]]) / 2
     bottom = floor - part["thickness_mm"]
-    corners = np.array([*(middle - half), bottom]), np.array([*(middle + half), floor])
+    corners = (*(middle - half), bottom), (*(middle + half), floor)
     places = [np.array([*hole, bottom]) @ axes for bracket in brackets for hole in bracket.holes]
     holes = drilled_holes(places, part["thickness_mm"] * axes[2], TAPPED_M5_MM)
     body = Component("plate", part.what, (box(*corners, axes),), tuple(holes), part=part.name)

@@ -231,7 +231,7 @@ class Lamps:
             foot = np.array([[x - FOOT_HALF_MM, out[0]], [x + FOOT_HALF_MM, out[1]]])
             column = (middle - half, middle + half)
             for (low, high), top in ((foot, floor + flange), (column, heights[1])):
-                added.append(box(np.array([*low, floor]), np.array([*high, top]), np.eye(3)))
+                added.append(box((*low, floor), (*high, top)))
             feet.append(foot)
             holes.append(middle + SCREW_SIDE_MM * beside + [0.0, side * SCREW_OUT_MM])
         places = np.vstack(holes)
@@ -252,7 +252,7 @@ class Lamps:
         y, z = place[1] + np.array([-half_y, half_y]), place[2] + np.array([-half_z, half_z])
         low, high = np.array([x, y, z]).T
         what = f"{self.strip.what}, cut to {cut}"
-        return Component(f"lamp_{number}", what, (box(low, high, np.eye(3)),), part=self.strip.name)
+        return Component(f"lamp_{number}", what, (box(low, high),), part=self.strip.name)
 
     def places(self, z: float) -> Floats:
         """Middles of the shining faces (l, 3), at a height."""
@@ -303,4 +303,4 @@ class Lamps:
         """The plate behind the strips, between two places across and two heights."""
         near = abs(float(place[0])) + self.strip["thickness_mm"]
         x = np.sort(np.sign(place[0]) * np.array([near, near + HOLDER_MM]))
-        return box(np.array([x[0], y[0], z[0]]), np.array([x[1], y[1], z[1]]), np.eye(3))
+        return box((x[0], y[0], z[0]), (x[1], y[1], z[1]))

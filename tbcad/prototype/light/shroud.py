@@ -137,9 +137,8 @@ def _panels(low: Floats, high: Floats, sheet: PurchasedPart) -> tuple[Panel, ...
     back, front = (x0 - thick, x0), (x1, x1 + thick)
     right, left = (y0 - thick, y0), (y1, y1 + thick)
     middle, half = (y0 + y1) / 2, NOTCH_MM[0] / 2
-    start = np.array([back[0] - 1.0, middle - half, z0 - 1.0])
-    end = np.array([back[1] + 1.0, middle + half, z0 + NOTCH_MM[1]])
-    notch = (box(start, end, np.eye(3)),)
+    end = back[1] + 1.0, middle + half, z0 + NOTCH_MM[1]
+    notch = (box((back[0] - 1.0, middle - half, z0 - 1.0), end),)
     flaps = ("left", "right", "top")
     return (
         _panel("floor", "floor of the shroud below the plate", (out_x, out_y, (z0 - thick, z0))),
@@ -160,7 +159,7 @@ def _panel(
 ) -> Panel:
     """A panel that fills ranges of x, y and z."""
     low, high = np.array(ranges).T
-    component = Component(PREFIX + name, what, (box(low, high, np.eye(3)),), notch)
+    component = Component(PREFIX + name, what, (box(low, high),), notch)
     width, height = np.delete(high - low, np.argmin(high - low)).tolist()
     return Panel(component, (width, height), flaps, bool(notch))
 

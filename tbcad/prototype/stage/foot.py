@@ -46,27 +46,23 @@ def stage_foot(site: Site, _: FrameLayout) -> Mounted:
     end = max(half, ear + BEYOND_EAR_MM)
     base, middle = np.array([0.0, 0.0, low]), np.array([0.0, 0.0, stage.foot])
     added = (
-        box(np.array([-half, -half, low]), np.array([end, half, stage.foot]), axes),
+        box((-half, -half, low), (end, half, stage.foot), axes),
         Cylinder(base, up, radius, COLLAR_HEIGHT_MM),
-        box(
-            np.array([stage.sizes.post + EAR_ROOT_MM, -EAR_MM, low]),
-            np.array([ear, EAR_MM, top]),
-            axes,
-        ),
+        box((stage.sizes.post + EAR_ROOT_MM, -EAR_MM, low), (ear, EAR_MM, top), axes),
     )
     holes = screw * np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
     places = [np.array([*hole, low]) @ axes for hole in holes]
     wire = min(stage.sizes.post - WIRE_WALL_MM, MAX_WIRE_MM)
     width = CHANNEL_WIDTH_MM / 2
     height = min(CHANNEL_HEIGHT_MM, spec.flange_mm - CHANNEL_ROOF_MM)
-    channel = np.array([-width, -half - THROUGH_MM, low - THROUGH_MM])
+    channel = -width, -half - THROUGH_MM, low - THROUGH_MM
     clamp, fasteners = _clamp(axes, stage, ear, top, site.parts)
     removed = (
         Cylinder(middle, up, stage.sizes.post + spec.post_play_mm / 2, COLLAR_HEIGHT_MM),
         Cylinder(base - THROUGH_MM * up, up, wire, COLLAR_HEIGHT_MM),
         *clamp,
         *drilled_holes(places, spec.flange_mm * up, CLEARANCE_HOLE_MM[5.0]),
-        box(channel, np.array([width, 0.0, low + height]), axes),
+        box(channel, (width, 0.0, low + height), axes),
     )
     component = Component(
         "stage_foot",
@@ -84,8 +80,8 @@ def _clamp(
 ) -> tuple[list[Primitive], tuple[Fastener, ...]]:
     """Slit, holes of screw and insert across it; the screw in one ear, its insert in the other."""
     insert, low = parts[CLAMP_INSERT], stage.foot + SLIT_FLOOR_MM
-    slit = np.array([0.0, -SLIT_MM / 2, low])
-    end = np.array([ear + BEYOND_EAR_MM, SLIT_MM / 2, top + THROUGH_MM])
+    slit = 0.0, -SLIT_MM / 2, low
+    end = ear + BEYOND_EAR_MM, SLIT_MM / 2, top + THROUGH_MM
     middle = np.array([ear - EAR_LENGTH_MM / 2, 0.0, (low + top) / 2 + SLIT_FLOOR_MM])
     side, outside, inside = (
         np.array([0.0, across, 0.0])

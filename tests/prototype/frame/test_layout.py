@@ -10,9 +10,8 @@ import pytest
 from tbcad.core.geometry.primitives import Component, Cylinder
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import base_fasteners
-from tbcad.prototype.base.layout import BaseLayout, base_layout
+from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.base.split import UNCUT
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.frame.camera_mount import CameraMount
@@ -48,11 +47,14 @@ def changed(site: Site, own: dict[str, Any] | None = None, **frame: Any) -> Site
     return replace(site, spec=site.spec.model_copy(update={"prototype": prototype}))
 
 
-def driven(prototype: PrototypeLayout, name: str) -> tuple[BaseLayout, BearingHead]:
-    """The base and the head for a drive, wherever else there is room."""
-    base = base_layout(SMALL.prototype.base.model_copy(update={"drive": name}), prototype)
-    axes = frame_axes(base.frame[0])
-    return base, bearing_head(SMALL.prototype.frame, base, drive(name), axes, PARTS)
+def driven(site: Site, name: str, number: int = 0) -> Site:
+    """With the base's hub for a drive, wherever else there is room."""
+    base = base_layout(SMALL.prototype.base.model_copy(update={"drive": name}), site.layout)
+    return replace(site, base=base, drive=drive(name, number))
+
+
+def head_of(site: Site) -> BearingHead:
+    return bearing_head(site, FrameLayout(()))
 
 
 class TestFrame:
@@ -105,38 +107,32 @@ class TestFrame:
         away = norm(stock.holes[:, None] - stock.holes)
         assert away[~np.eye(len(away), dtype=bool)].min() > 15
 
-    def test_a_motor_on_the_axis(self, site: Site, small_prototype: PrototypeLayout) -> None:
-        base = base_layout(
-            SMALL.prototype.base.model_copy(update={"drive": "nema17-direct"}), small_prototype
-        )
-        keep_out = keep_out_volume(small_prototype, base, CAPTURE_RADIUS, 0.0)
-        stage = stage_layout(SMALL.prototype, small_prototype, keep_out, PARTS)
-        motor_drive = drive("nema17-direct", 1)
-        found = frame_layout(
-            replace(site, base=base, drive=motor_drive, keep_out=keep_out, stage=stage)
-        )
+    def test_a_motor_on_the_axis(self, site: Site) -> None:
+        around = driven(site, "nema17-direct", 1)
+        keep_out = keep_out_volume(site.layout, around.base, CAPTURE_RADIUS, 0.0)
+        stage = stage_layout(SMALL.prototype, site.layout, keep_out, PARTS)
+        found = frame_layout(replace(around, keep_out=keep_out, stage=stage))
         assert not any(item.name.startswith("bearing") for item in found.purchased)
         (motor,) = (item for item in found.purchased if item.name == "motor")
         pilot = motor.added[1]
         assert isinstance(pilot, Cylinder)
-        assert norm(np.cross(pilot.start, base.frame[0])) < 1e-9
+        assert norm(np.cross(pilot.start, around.base.frame[0])) < 1e-9
         assert not {"608-2Z", "COLLAR-8"} & {name for one in found.mounted for name in one.listed}
 
     @pytest.mark.parametrize("name", ["nema17-belt", "nema17-direct", "stage-60"])
-    def test_what_rotates_is_bolted_to_what_rotates(
-        self, small_prototype: PrototypeLayout, name: str
-    ) -> None:
-        base, head = driven(small_prototype, name)
+    def test_what_rotates_is_bolted_to_what_rotates(self, site: Site, name: str) -> None:
+        around = driven(site, name)
+        head = head_of(around)
         turning = {item.name for item in head.purchased if item.rotates}
         turning |= {"carrier", "zero_disc"}
-        some = [*base_fasteners(base, UNCUT, drive(name), PARTS), *head.fasteners]
+        some = [*base_fasteners(around.base, UNCUT, around.drive, PARTS), *head.fasteners]
         assert {one.rotates for one in some} == {True, False}
         for one in some:
             assert {body in turning for body in one.through} == {one.rotates}, one.through
 
-    def test_the_top_of_a_stage_keeps_from_its_body(self, small_prototype: PrototypeLayout) -> None:
-        base, head = driven(small_prototype, "stage-60")
-        bodies = {item.name: item.added[0] for item in head.purchased}
+    def test_the_top_of_a_stage_keeps_from_its_body(self, site: Site) -> None:
+        around = driven(site, "stage-60")
+        bodies, base = {one.name: one.added[0] for one in head_of(around).purchased}, around.base
         body, top = bodies["rotary_stage"], bodies["rotary_stage_top"]
         assert isinstance(body, Cylinder)
         assert isinstance(top, Cylinder)
@@ -146,21 +142,17 @@ class TestFrame:
         assert bottom > body.start @ w
         screws = [
             one
-            for one in base_fasteners(base, UNCUT, drive("stage-60"), PARTS)
+            for one in base_fasteners(base, UNCUT, around.drive, PARTS)
             if one.through[-1] == "rotary_stage_top"
         ]
         assert len(screws) == 4
         assert all(one.place @ w - one.part["length_mm"] > bottom for one in screws)
 
-    def test_the_shaft_is_as_long_as_the_motor_has_it_with_the_belt_tight(
-        self, small_prototype: PrototypeLayout
-    ) -> None:
+    def test_the_shaft_is_as_long_as_the_motor_has_it_with_the_belt_tight(self, site: Site) -> None:
         """24 mm from the face (OpenSCAD library NopSCADlib, stepper_motors.scad: NEMA17)."""
-        base = driven(small_prototype, "nema17-belt")[0]
-        axes, w = frame_axes(base.frame[0]), base.frame[0]
+        w = site.base.frame[0]
         for one in (each for each in DRIVES if each.belt):
-            head = bearing_head(SMALL.prototype.frame, base, one, axes, PARTS)
-            motor, pinion = motor_and_pinion(head)
+            motor, pinion = motor_and_pinion(head_of(replace(site, drive=one)))
             assert norm(np.cross(pinion.start, w)) == pytest.approx(one.centre_mm)
             shaft = motor.added[2]
             assert isinstance(shaft, Cylinder)
