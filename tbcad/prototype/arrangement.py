@@ -17,12 +17,7 @@ from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.section import AUTO
 from tbcad.core.spec.sizes import led_places
-from tbcad.prototype.balls.layout import (
-    BallChoices,
-    PrototypeLayout,
-    ball_counts,
-    prototype_layout,
-)
+from tbcad.prototype.balls.layout import BallChoices, PrototypeLayout, ball_counts, prototype_layout
 from tbcad.prototype.base.caps import cap_magnets
 from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout, base_layout, carrier_masses

@@ -26,8 +26,6 @@ from tbcad.prototype.frame.shared import (
     THROUGH_MM,
     BearingHead,
     HeadPlate,
-    axial_cylinder,
-    hub_point,
 )
 from tbcad.prototype.part import FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import Parts, choose_part, choose_screw
@@ -153,7 +151,7 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
     if place.disc < PIN_OUT_MM + PIN_HOLE_MM / 2 + MIN_EDGE_MM:
         raise SpecError("the zero disc has no room for its pin: make prototype.frame.web_mm larger")
     added: list[Primitive] = [
-        axial_cylinder(base, back, hub.face, place.disc),
+        base.cylinder(back, hub.face, place.disc),
         _prism(base, _tab(place, angles), back, ZERO_DISC_MM),
     ]
     holes = [(0.0, 0.0, 2 * hub.bore + BORE_PLAY_MM), (PIN_OUT_MM, 0.0, PIN_HOLE_MM)]
@@ -167,9 +165,7 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
         )
     low, high = back - THROUGH_MM, hub.face + THROUGH_MM
     removed: list[Primitive] = [
-        cylinder_between(
-            hub_point(base, low, out, side), hub_point(base, high, out, side), diameter / 2
-        )
+        cylinder_between(base.point(low, out, side), base.point(high, out, side), diameter / 2)
         for out, side, diameter in holes
     ]
     rim = rectangle((place.disc - MARK_MM, -MARK_MM / 2), (place.disc + MARK_MM, MARK_MM / 2))
@@ -185,7 +181,7 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
 
 def _prism(base: BaseLayout, polygon: Floats, back: float, height: float) -> Prism:
     """A convex polygon (n, 2) of (out, side) across the axis."""
-    corners = np.array([hub_point(base, back, out, side) for out, side in polygon.tolist()])
+    corners = np.array([base.point(back, out, side) for out, side in polygon.tolist()])
     return Prism(corners, height * base.frame[0])
 
 
@@ -216,8 +212,8 @@ def _bracket(base: BaseLayout, plate: HeadPlate, place: _SwitchPlace) -> Compone
     removed: list[Primitive] = []
     for out in bracket_screws():
         middle = plate.back + (plate.front - plate.back) / 2
-        inner = hub_point(base, middle, out, near - THROUGH_MM)
-        outer = hub_point(base, middle, out, far + THROUGH_MM)
+        inner = base.point(middle, out, near - THROUGH_MM)
+        outer = base.point(middle, out, far + THROUGH_MM)
         removed.append(cylinder_between(inner, outer, SCREW_MM / 2))
     axes = place.axes(base)
     for around in HOLES_MM:
@@ -237,7 +233,7 @@ def _fasteners(
     middle, far = plate.back + (plate.front - plate.back) / 2, plate.half_width + BRACKET_MM
     axes, through = place.axes(base), ("home_bracket", "bearing_head")
     on_head = [
-        Fastener(bracket, hub_point(base, middle, out, far), -base.frame[2], through)
+        Fastener(bracket, base.point(middle, out, far), -base.frame[2], through)
         for out in bracket_screws()
     ]
     top = place.low + SWITCH_MM

@@ -15,11 +15,7 @@ from tbcad.common.schedule import Submit
 from tbcad.core.geometry.primitives import Component
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.arrangement import (
-    PrototypeModel,
-    balance_and_drive,
-    shroud_round,
-)
+from tbcad.prototype.arrangement import PrototypeModel, balance_and_drive, shroud_round
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.coupon import coupon_plates
 from tbcad.prototype.base.coupon_seats import expected_downs, worst_pose

@@ -13,12 +13,7 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.electronics import (
-    e24_at_least,
-    led_circuit,
-    series_resistor,
-    wiring_layout,
-)
+from tbcad.prototype.electronics import e24_at_least, led_circuit, series_resistor, wiring_layout
 from tbcad.prototype.files.bom import ALWAYS, PrintedItem, bom_rows, totals
 from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.purchased.parts import Prices, load_parts, load_prices
@@ -50,11 +45,7 @@ LIGHT = st.fixed_dictionaries({"led_ma": st.floats(1, 20), "led_supply_v": st.fl
 @settings(SHARED, max_examples=30)
 @given(leds=st.integers(0, 6), motion=MOTION, light=LIGHT, drive=st.sampled_from(DRIVES))
 def test_every_line_of_the_wiring(
-    site: Site,
-    leds: int,
-    motion: dict[str, str],
-    light: dict[str, float],
-    drive: Drive,
+    site: Site, leds: int, motion: dict[str, str], light: dict[str, float], drive: Drive
 ) -> None:
     spec, stage = site.spec.prototype, site.stage
     changes = {

@@ -43,11 +43,7 @@ def test_parts_have_the_sizes_of_their_standards() -> None:
 
 @pytest.mark.parametrize(
     ("kind", "density", "size"),
-    [
-        ("magnets", 7.5, "height_mm"),
-        ("dowels", 7.85, "length_mm"),
-        ("shafts", 7.85, "length_mm"),
-    ],
+    [("magnets", 7.5, "height_mm"), ("dowels", 7.85, "length_mm"), ("shafts", 7.85, "length_mm")],
 )
 def test_masses_of_rods(kind: str, density: float, size: str) -> None:
     for part in of_kind(PARTS, kind):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tbcad.core.geometry.primitives import Cylinder, cylinder_between
 from tbcad.core.geometry.rotations import even_angles, unit_circle
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.optics.ball_light import light_hulls
@@ -106,9 +107,13 @@ class BaseLayout:
             insertion=seats.insertion @ rotation,
         )
 
-    def outermost(self, swing: float) -> float:
-        """Largest azimuth, to either side, that the wall reaches over a swing, radians."""
-        return float(np.abs(self.sector).max() + swing / 2)
+    def point(self, along: float, out: float = 0.0, side: float = 0.0) -> Floats:
+        """A point along the axis, out from it at azimuth zero, and across, in the shell's frame."""
+        return np.asarray(np.array([along, out, side]) @ self.frame)
+
+    def cylinder(self, start: float, end: float, radius: float, out: float = 0.0) -> Cylinder:
+        """A cylinder between two places along the axis, or beside it, mm."""
+        return cylinder_between(self.point(start, out), self.point(end, out), radius)
 
 
 def base_layout(spec: BaseSpec, prototype: PrototypeLayout) -> BaseLayout:

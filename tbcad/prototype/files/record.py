@@ -77,9 +77,7 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         ),
         calibration=_calibration(built),
         controller=Controller(
-            firmware=spec.motion.controller,
-            axis=spec.motion.axis,
-            phases=phases(leds, spec.motion),
+            firmware=spec.motion.controller, axis=spec.motion.axis, phases=phases(leds, spec.motion)
         ),
         caps=cap_limits(built.spec, built.base, layout),
         camera_place=_camera_place(built),

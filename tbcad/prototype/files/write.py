@@ -37,13 +37,7 @@ from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record
 from tbcad.prototype.frame.stock import Stock
 from tbcad.prototype.light.shroud import pattern
 from tbcad.prototype.model import build_prototype_model
-from tbcad.prototype.printed import (
-    PrintedPart,
-    Role,
-    component_solid,
-    part_mesh,
-    print_estimate,
-)
+from tbcad.prototype.printed import PrintedPart, Role, component_solid, part_mesh, print_estimate
 from tbcad.prototype.purchased.parts import Prices, load_prices
 from tbcad.prototype.registry import PARTS
 from tbcad.records.prototype import NAME

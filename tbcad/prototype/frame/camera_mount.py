@@ -269,8 +269,7 @@ def _plate(place: _Place) -> Component:
     removed.append(slot(tripod, place.own[0], 2 * place.along, TRIPOD_HOLE_MM / 2, depth))
     removed.append(
         place.block(
-            (screw - recess, -RECESS_MM, near + TRIPOD_MM),
-            (screw + recess, RECESS_MM, through[1]),
+            (screw - recess, -RECESS_MM, near + TRIPOD_MM), (screw + recess, RECESS_MM, through[1])
         )
     )
     for across in (-FENCE_SCREW_MM, FENCE_SCREW_MM):
@@ -404,6 +403,6 @@ CAMERA = Part(
     (camera_step,),
     camera_mount,
     remedies={
-        "camera*": "prototype.frame.camera_screw_mm larger or prototype.camera_diameter_mm smaller",
+        "camera*": "prototype.frame.camera_screw_mm larger or prototype.camera_diameter_mm smaller"
     },
 )

@@ -7,15 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tbcad.cad.drafting.dimensions import across, centre_cross, diameter
-from tbcad.cad.drafting.sheet import (
-    A4,
-    BESIDE_MM,
-    Sheet,
-    drawing_room,
-    notes,
-    placed,
-    sheet_frame,
-)
+from tbcad.cad.drafting.sheet import A4, BESIDE_MM, Sheet, drawing_room, notes, placed, sheet_frame
 from tbcad.cad.formats.entities import Circle, Layer, Point
 from tbcad.core.geometry.primitives import Component, Cylinder, box, cylinder_between
 from tbcad.core.geometry.rotations import bolt_circle
@@ -32,8 +24,6 @@ from tbcad.prototype.frame.shared import (
     PLATE_MM,
     THROUGH_MM,
     HeadPlate,
-    axial_cylinder,
-    hub_point,
 )
 from tbcad.prototype.part import Part, Site
 from tbcad.prototype.purchased.parts import PurchasedPart, choose_screw
@@ -95,7 +85,7 @@ def _hub_screw_holes(base: BaseLayout, length: float, diameter: float) -> tuple[
     """Holes for the screws into the hub, through a body behind it."""
     start, end = base.hub.mount + THROUGH_MM, base.hub.mount - length - THROUGH_MM
     return tuple(
-        cylinder_between(hub_point(base, start, x, y), hub_point(base, end, x, y), diameter / 2)
+        cylinder_between(base.point(start, x, y), base.point(end, x, y), diameter / 2)
         for x, y in base.hub.holes.tolist()
     )
 
@@ -111,15 +101,15 @@ def _ring(
 ) -> Component:
     """A part about the axis, or out from it, by its ends along it, outer diameter and bore."""
     (start, end), (outer, bore) = ends, diameters
-    body = axial_cylinder(base, start, end, outer / 2, out)
-    through = axial_cylinder(base, start + THROUGH_MM, end - THROUGH_MM, bore / 2, out)
+    body = base.cylinder(start, end, outer / 2, out)
+    through = base.cylinder(start + THROUGH_MM, end - THROUGH_MM, bore / 2, out)
     return Component(name, part.what, (body,), (through, *holes), part=part.name)
 
 
 def _coupling(base: BaseLayout, part: PurchasedPart) -> Component:
     """A flange on the hub's face, and its collar, which keys of the flange's screws pass."""
     face = base.hub.mount
-    flange = axial_cylinder(base, face, face - COUPLING_FLANGE_MM, part["flange_mm"] / 2)
+    flange = base.cylinder(face, face - COUPLING_FLANGE_MM, part["flange_mm"] / 2)
     ends = face, face - COUPLING_MM + COUPLING_GAP_MM
     holes = _hub_screw_holes(base, COUPLING_FLANGE_MM, part["hole_mm"])
     ring = _ring(base, "coupling", part, ends, (COUPLING_COLLAR_MM, part["bore_mm"]), holes)
@@ -131,13 +121,13 @@ def _on_shaft(base: BaseLayout, plate: HeadPlate, shaft_parts: ShaftParts) -> li
     bearing, shaft, collar = shaft_parts.bearing, shaft_parts.shaft, shaft_parts.collar
     front, rear, width = base.hub.socket, shaft_parts.rear, bearing["width_mm"]
     end = front - shaft["length_mm"]
-    body = axial_cylinder(base, front, end, shaft["diameter_mm"] / 2)
+    body = base.cylinder(front, end, shaft["diameter_mm"] / 2)
     rings = [
         _ring(base, name, bearing, (at, at - width), (bearing["outer_mm"], bearing["bore_mm"]))
         for name, at in (("bearing_front", plate.front), ("bearing_rear", rear + width))
     ]
-    bore = axial_cylinder(base, rear + THROUGH_MM, end - SHAFT_END_MM, collar["bore_mm"] / 2)
-    ring = axial_cylinder(base, rear, rear - collar["width_mm"], collar["outer_mm"] / 2)
+    bore = base.cylinder(rear + THROUGH_MM, end - SHAFT_END_MM, collar["bore_mm"] / 2)
+    ring = base.cylinder(rear, rear - collar["width_mm"], collar["outer_mm"] / 2)
     return [
         Component("shaft", shaft.what, (body,), part=shaft.name, rotates=True),
         *rings,
@@ -156,8 +146,8 @@ def _rotary_stage(
     """A stage before the plate, and its top, which rotates with the hub."""
     start, radius = base.hub.mount, stage["top_mm"] / 2
     end = start - STAGE_TOP_MM
-    top = axial_cylinder(base, start, end, radius)
-    body = axial_cylinder(base, end - STAGE_GAP_MM, plate.front, radius)
+    top = base.cylinder(start, end, radius)
+    body = base.cylinder(end - STAGE_GAP_MM, plate.front, radius)
     return (
         Component("rotary_stage", stage.what, (body,), part=stage.name),
         Component("rotary_stage_top", "top of the rotary stage", (top,), rotates=True),
@@ -170,8 +160,8 @@ def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:
     half, pilot = motor["frame_mm"] / 2, (back - OVERLAP_MM, back + motor["pilot_height_mm"])
     added = (
         box((back - motor["length_mm"], out - half, -half), (back, out + half, half), base.frame),
-        axial_cylinder(base, *pilot, motor["pilot_mm"] / 2, out),
-        axial_cylinder(base, back, back + motor["shaft_length_mm"], motor["shaft_mm"] / 2, out),
+        base.cylinder(*pilot, motor["pilot_mm"] / 2, out),
+        base.cylinder(back, back + motor["shaft_length_mm"], motor["shaft_mm"] / 2, out),
     )
     return Component("motor", motor.what, added, part=motor.name)
 
@@ -195,7 +185,7 @@ def motor_fasteners(site: Site, plate: HeadPlate) -> Iterator[Fastener]:
         screw = choose_screw(parts, 6.0, PLATE_MM + 2 * MOTOR_THREAD_MM)
         start, along, body = plate.back, w, "rotary_stage"
     for out, side in motor_screw_places(drive):
-        yield Fastener(screw, hub_point(base, start, out, side), along, ("bearing_head", body))
+        yield Fastener(screw, base.point(start, out, side), along, ("bearing_head", body))
 
 
 @planned("Rotary stage on the head", "rotary_stage*")

@@ -41,9 +41,7 @@ from tbcad.prototype.frame.shared import (
     THROUGH_MM,
     BearingHead,
     HeadPlate,
-    axial_cylinder,
     drilled_holes,
-    hub_point,
     level_prism,
     on_uprights,
     webs,
@@ -87,7 +85,7 @@ def bearing_head(site: Site, _: FrameLayout) -> BearingHead:
     spec, base, axes, parts = site.spec.prototype.frame, site.base, site.axes, site.parts
     plate = _behind_disc(_head_plate(site), base, axes)
     shaft_parts = _shaft_parts(base, plate, parts) if site.drive.belt else None
-    edge = axes @ hub_point(base, plate.back, plate.low)
+    edge = axes @ base.point(plate.back, plate.low)
     face = float(edge[0] + OVERLAP_MM - spec.flange_mm)
     low, top = float(edge[2]) - BELOW_MM, float(edge[2]) + ABOVE_MM - plate.low
     corner = plate.front, plate.high, plate.half_width
@@ -102,7 +100,7 @@ def bearing_head(site: Site, _: FrameLayout) -> BearingHead:
     removed += drilled_holes(screws, spec.flange_mm * axes[0], CLEARANCE_HOLE_MM[5.0])
     if shaft_parts:
         rear, radius = shaft_parts.rear, shaft_parts.tube
-        added.append(axial_cylinder(base, plate.front - OVERLAP_MM, rear, radius))
+        added.append(base.cylinder(plate.front - OVERLAP_MM, rear, radius))
         removed += _seats(spec, base, plate, shaft_parts)
     w = base.frame[0]
     component = Component(
@@ -122,7 +120,7 @@ def bearing_head(site: Site, _: FrameLayout) -> BearingHead:
             *(
                 Fastener(
                     insert,
-                    hub_point(base, beside, out, plate.half_width),
+                    base.point(beside, out, plate.half_width),
                     -base.frame[2],
                     (component.name,),
                 )
@@ -186,7 +184,7 @@ def _flange(site: Site, plate: HeadPlate, at: tuple[float, float, float]) -> lis
     front, inside = face + spec.flange_mm, face + spec.flange_mm - OVERLAP_MM
     flange = level_prism(rectangle((face, low), (front, top)), -half, half, axes)
     # The webs' one edge lies within the plate, its line prolonged into the flange.
-    start = axes @ hub_point(base, plate.back + OVERLAP_MM, 0.0)
+    start = axes @ base.point(plate.back + OVERLAP_MM, 0.0)
     rise = axes @ base.frame[1]
     foot = start + (inside - start[0]) / rise[0] * rise
     end = start + min(REACH_MM, plate.high) * rise
@@ -197,15 +195,15 @@ def _flange(site: Site, plate: HeadPlate, at: tuple[float, float, float]) -> lis
 def _zero_holes(base: BaseLayout, plate: HeadPlate) -> list[Primitive]:
     """Hole of the zero pin and mark beside it; inserts for the bracket of the switch."""
     spec, through = base.spec, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
-    pin = hub_point(base, plate.back - THROUGH_MM, PIN_OUT_MM)
+    pin = base.point(plate.back - THROUGH_MM, PIN_OUT_MM)
     mark = plate.front - MARK_DEPTH_MM, PIN_OUT_MM, -MARK_MM / 2
     end = plate.front + THROUGH_MM, MARK_END_MM, MARK_MM / 2
     holes: list[Primitive] = [cylinder_between(pin, pin + through, PIN_HOLE_MM / 2)]
     holes.append(box(mark, end, base.frame))
     middle, deep = plate.front - PLATE_MM / 2, plate.half_width - spec.insert_depth_mm
     for out in bracket_screws():
-        inner = hub_point(base, middle, out, deep)
-        outer = hub_point(base, middle, out, plate.half_width + THROUGH_MM)
+        inner = base.point(middle, out, deep)
+        outer = base.point(middle, out, plate.half_width + THROUGH_MM)
         holes.append(cylinder_between(inner, outer, spec.insert_hole_mm / 2))
     return holes
 
@@ -218,11 +216,11 @@ def _seats(
     rear, seat = shaft_parts.rear, (outer + spec.bearing_fit_mm) / 2
     beyond = rear - 2 * shaft_parts.tube
     return [
-        axial_cylinder(base, plate.front + THROUGH_MM, plate.front - width, seat),
-        axial_cylinder(base, plate.front, beyond, outer / 2 - SHOULDER_MM),
-        axial_cylinder(base, rear + width, rear - THROUGH_MM, seat),
+        base.cylinder(plate.front + THROUGH_MM, plate.front - width, seat),
+        base.cylinder(plate.front, beyond, outer / 2 - SHOULDER_MM),
+        base.cylinder(rear + width, rear - THROUGH_MM, seat),
         # The flange may reach beyond the tube: the bearing goes through it without being pressed.
-        axial_cylinder(base, rear, beyond, outer / 2 + RELIEF_MM),
+        base.cylinder(rear, beyond, outer / 2 + RELIEF_MM),
     ]
 
 
@@ -231,7 +229,7 @@ def _motor_holes(site: Site, plate: HeadPlate) -> list[Primitive]:
     spec, base, drive = site.spec.prototype.frame, site.base, site.drive
     motor, depth = drive.motor, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
     start = plate.back - THROUGH_MM
-    places = [hub_point(base, start, out, side) for out, side in motor_screw_places(drive)]
+    places = [base.point(start, out, side) for out, side in motor_screw_places(drive)]
     if motor.kind == "stages":
         # Screws go in from behind, where flange and webs are.
         behind = (KEY_ROOM_MM + THROUGH_MM) * base.frame[0]
@@ -241,7 +239,7 @@ def _motor_holes(site: Site, plate: HeadPlate) -> list[Primitive]:
         return [*through, *(cylinder_between(at - behind, at, access) for at in to_heads)]
     travel = spec.belt_travel_mm if drive.belt else 0.0
     pilot, screw = motor["pilot_mm"] / 2 + PILOT_PLAY_MM, CLEARANCE_HOLE_MM[motor["thread_mm"]] / 2
-    middle = hub_point(base, start, drive.centre_mm)
+    middle = base.point(start, drive.centre_mm)
     holes = [slot(middle, base.frame[1], travel, pilot, depth)]
     holes += [slot(place, base.frame[1], travel, screw, depth) for place in places]
     if not drive.belt:
@@ -262,10 +260,7 @@ def head_step(machine: AssembledMachine) -> Words:
         when(bearings, seat),
         "Screw the head on the uprights with the T-nuts, its upper edge flush with their ends.",
     ]
-    checks = [
-        "A straight edge across both uprights' ends touches the head.",
-        when(bearings, turns),
-    ]
+    checks = ["A straight edge across both uprights' ends touches the head.", when(bearings, turns)]
     return does, checks
 
 

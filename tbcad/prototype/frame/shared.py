@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.core.geometry.primitives import Cylinder, Primitive, Prism, cylinder_between
-from tbcad.prototype.base.layout import BaseLayout
+from tbcad.core.geometry.primitives import Primitive, Prism, cylinder_between
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.part import Mounted
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
@@ -71,18 +70,6 @@ def drilled_holes(places: Sequence[Floats], depth: Floats, diameter: float) -> l
     return [
         cylinder_between(place - beyond, place + depth + beyond, diameter / 2) for place in places
     ]
-
-
-def hub_point(base: BaseLayout, along: float, out: float = 0.0, side: float = 0.0) -> Floats:
-    """A point along the axis, out from it at azimuth zero, and across, in the shell's frame."""
-    return np.asarray(np.array([along, out, side]) @ base.frame)
-
-
-def axial_cylinder(
-    base: BaseLayout, start: float, end: float, radius: float, out: float = 0.0
-) -> Cylinder:
-    """A cylinder between two places along the axis, or beside it, mm."""
-    return cylinder_between(hub_point(base, start, out), hub_point(base, end, out), radius)
 
 
 def on_uprights(

@@ -2,13 +2,7 @@
 
 import numpy as np
 
-from tbcad.core.geometry.primitives import (
-    Component,
-    Cylinder,
-    Primitive,
-    box,
-    cylinder_between,
-)
+from tbcad.core.geometry.primitives import Component, Cylinder, Primitive, box, cylinder_between
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.shared import CLEARANCE_HOLE_MM, THROUGH_MM, drilled_holes
@@ -64,13 +58,7 @@ def stage_foot(site: Site, _: FrameLayout) -> Mounted:
         *drilled_holes(places, spec.flange_mm * up, CLEARANCE_HOLE_MM[5.0]),
         box(channel, (width, 0.0, low + height), axes),
     )
-    component = Component(
-        "stage_foot",
-        "clamp of the stage's post",
-        added,
-        removed,
-        (-up, up),
-    )
+    component = Component("stage_foot", "clamp of the stage's post", added, removed, (-up, up))
     foot = np.array([[-half, -half], [end, half]])
     return Mounted(brackets=(Bracket(component, holes, foot, fasteners),))
 

@@ -17,11 +17,7 @@ from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machin
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_record, record
 from tbcad.prototype.files.bom import COLUMNS
 from tbcad.records.tables import BallRow, WiringRow
-from tests.prototype_records import (
-    drive_section,
-    printed_part,
-    prototype_document,
-)
+from tests.prototype_records import drive_section, printed_part, prototype_document
 
 Record = dict[str, Any]
 PRINTED = ("carrier", "zero_disc", "bearing_head", "stage_foot", "coupon_1")

@@ -24,10 +24,7 @@ def purchased(frame: FrameLayout) -> dict[str, TopoDS_Shape]:
 
 class TestSolids:
     def test_bearing_seats_and_bearings_are_on_the_axis(
-        self,
-        carrier: BaseLayout,
-        frame: FrameLayout,
-        purchased: dict[str, TopoDS_Shape],
+        self, carrier: BaseLayout, frame: FrameLayout, purchased: dict[str, TopoDS_Shape]
     ) -> None:
         w, seat = carrier.frame[0], (22 + FRAME.bearing_fit_mm) / 2
         head = cylinders(component_solid(frame.of(BearingHead).printed[0]))
