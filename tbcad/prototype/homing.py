@@ -165,8 +165,7 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
         )
     low, high = back - THROUGH_MM, hub.face + THROUGH_MM
     removed: list[Primitive] = [
-        cylinder_between(base.point(low, out, side), base.point(high, out, side), diameter / 2)
-        for out, side, diameter in holes
+        base.cylinder(low, high, diameter / 2, out, side) for out, side, diameter in holes
     ]
     rim = rectangle((place.disc - MARK_MM, -MARK_MM / 2), (place.disc + MARK_MM, MARK_MM / 2))
     removed.append(_prism(base, rim, back - THROUGH_MM, ZERO_DISC_MM + 2 * THROUGH_MM))

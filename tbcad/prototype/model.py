@@ -26,7 +26,7 @@ from tbcad.prototype.drive.balance import PointMasses
 from tbcad.prototype.electronics import Wiring
 from tbcad.prototype.frame.layout import frame_layout
 from tbcad.prototype.homing import HomingLayout
-from tbcad.prototype.printed import PlacedSolid, PrintedPart, Role, placed_components
+from tbcad.prototype.printed import PlacedSolid, PrintedPart, Role, placed_component
 from tbcad.types import Progress
 
 # Arrangements whose solids are tried, and how many of them with the same number of balls.
@@ -112,9 +112,7 @@ def _base_and_stage(
     mesh_mm = arrangement.spec.mesh.structure_error_mm
     pose = worst_pose(base, split, expected_downs(base, split))
     coupons = submit(parts_or_error, coupon_plates, base, printer, pose, mesh_mm)
-    on_stage = submit(
-        parts_or_error, placed_components, arrangement.stage.components, printer, mesh_mm
-    )
+    on_stage = submit(parts_or_error, _placed, arrangement.stage.components, arrangement.spec)
     carrier = carrier_parts(base, split, printer, mesh_mm)
     printed_pose = worst_pose(base, split, [-part.axes[:, 2] for part in carrier])
     if not printed_pose.is_like(pose):  # the bed has no room for the pose that was expected
@@ -123,7 +121,8 @@ def _base_and_stage(
 
 
 def _placed(components: Sequence[Component], spec: Spec) -> list[PlacedSolid]:
-    return placed_components(components, spec.printer, spec.mesh.structure_error_mm)
+    mesh_mm = spec.mesh.structure_error_mm
+    return [placed_component(one, spec.printer, mesh_mm) for one in components]
 
 
 def parts_or_error(build: Callable[..., list[PlacedSolid]], *arguments: Any) -> PartsOrError:

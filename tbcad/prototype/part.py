@@ -5,7 +5,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,9 +22,6 @@ from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.purchased.parts import Parts
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.types import Floats
-
-if TYPE_CHECKING:
-    from tbcad.prototype.arrangement import PrototypeModel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,6 +135,6 @@ class Part:
     # on the frame, beside the parts before it; None where a design has none
     layout: Callable[[Site, FrameLayout], Mounted | None] = lambda site, before: None
     # of what is cut or drilled by hand, with the list of parts
-    sheets: Callable[["PrototypeModel", PartsList], Iterable[Sheet]] = lambda model, bill: ()
+    sheets: Callable[[Site, FrameLayout, PartsList], Iterable[Sheet]] = lambda *_: ()
     # what to change where bodies meet light or base, by patterns of their names
     remedies: Mapping[str, str] = field(default_factory=dict)

@@ -3,8 +3,6 @@
 import math
 from dataclasses import replace
 from itertools import combinations
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -30,8 +28,7 @@ BILL = PartsList(
 
 
 def sheets(site: Site, frame: FrameLayout) -> dict[str, Sheet]:
-    model: Any = SimpleNamespace(base=site.base, drive=site.drive, frame=frame)
-    return {sheet.name: sheet for part in PARTS for sheet in part.sheets(model, BILL)}
+    return {sheet.name: sheet for part in PARTS for sheet in part.sheets(site, frame, BILL)}
 
 
 @pytest.fixture(scope="module")

@@ -111,9 +111,12 @@ class BaseLayout:
         """A point along the axis, out from it at azimuth zero, and across, in the shell's frame."""
         return np.asarray(np.array([along, out, side]) @ self.frame)
 
-    def cylinder(self, start: float, end: float, radius: float, out: float = 0.0) -> Cylinder:
+    def cylinder(
+        self, start: float, end: float, radius: float, out: float = 0.0, side: float = 0.0
+    ) -> Cylinder:
         """A cylinder between two places along the axis, or beside it, mm."""
-        return cylinder_between(self.point(start, out), self.point(end, out), radius)
+        ends = (self.point(along, out, side) for along in (start, end))
+        return cylinder_between(*ends, radius)
 
 
 def base_layout(spec: BaseSpec, prototype: PrototypeLayout) -> BaseLayout:

@@ -90,7 +90,7 @@ def export_prototype(
     bill = _bill(built, [estimate.result() for estimate in prints], prices)
     write_table(folder / bom.NAME, bom.COLUMNS, bill)
     listed = bom.PartsList(tuple(bill), title)
-    drawings = [sheet for part in PARTS for sheet in part.sheets(built, listed)]
+    drawings = [sheet for part in PARTS for sheet in part.sheets(built, built.frame, listed)]
     for sheet in drawings:
         submit(sheet.write, folder)
     record = prototype_record(built, bill, drawings)

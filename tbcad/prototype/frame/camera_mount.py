@@ -27,7 +27,7 @@ from tbcad.core.geometry.primitives import (
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec
+from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.shared import (
@@ -73,6 +73,7 @@ BRACKET_FOOT_MM = 70.0  # length of the foot beyond the bracket
 FOOT_BORDER_MM = 15.0  # of the foot beside the bracket: washers clear the webs by 1 mm
 WEB_SETBACK_MM = 4.0  # of webs from the ends of their flanges
 SLOT_SIDE_MM, SLOT_INNER_MM, SLOT_OUTER_MM = 9.0, 20.0, 14.0  # from the foot's edges to its slots
+REMEDY = "prototype.frame.camera_screw_mm larger or prototype.camera_diameter_mm smaller"
 AXIAL = 1e-6  # largest part of the camera's direction out of the frame's plane
 
 
@@ -100,11 +101,6 @@ class _Place:
         return np.stack([back, self.axes[1], unit(level - (level @ back) * back)])
 
     @property
-    def frame(self) -> FrameSpec:
-        """The section of the frame."""
-        return self.spec.frame
-
-    @property
     def radius(self) -> float:
         """Of the camera's body: its optical axis over the camera plate."""
         return self.spec.camera_diameter_mm / 2
@@ -117,7 +113,7 @@ class _Place:
     @property
     def along(self) -> float:
         """Travel of the camera along its axis to either side."""
-        return self.frame.camera_travel_mm / 2
+        return self.spec.frame.camera_travel_mm / 2
 
     @property
     def fence_screws(self) -> float:
@@ -150,7 +146,7 @@ class _Place:
     def screws(self) -> Floats:
         """Places (3, 2) of the three screws: behind the pinhole, and across."""
         upper = TOP_MM + UPPER_MM
-        beyond = self.frame.camera_screw_mm + self.recess + self.insert["outer_mm"]
+        beyond = self.spec.frame.camera_screw_mm + self.recess + self.insert["outer_mm"]
         lower = max(TOP_MM + LOWER_MM, beyond)
         return np.array([[upper, -PAIR_MM], [upper, PAIR_MM], [lower, 0.0]])
 
@@ -213,14 +209,14 @@ def _fasteners(place: _Place, parts: Parts) -> tuple[Fastener, ...]:
         *(_tilting_screw(place, back, across, parts) for back, across in place.screws.tolist()),
         *(_fence_screw(place, side * FENCE_SCREW_MM, parts) for side in (-1, 1)),
     ]
-    at = place.point(place.frame.camera_screw_mm, 0.0, place.radius + TRIPOD_MM)
+    at = place.point(place.spec.frame.camera_screw_mm, 0.0, place.radius + TRIPOD_MM)
     tripod = Fastener(parts[CAMERA_SCREW], at, -place.own[2], ("camera_plate", "camera"))
     return (*(one for some in screws for one in some), tripod)
 
 
 def _tilting_screw(place: _Place, back: float, across: float, parts: Parts) -> tuple[Fastener, ...]:
     """A screw through the bracket into the plate's insert, with a nut against either."""
-    flange, out = place.frame.flange_mm, place.own[2]
+    flange, out = place.spec.frame.flange_mm, place.own[2]
     length = WASHER_MM + flange + GAP_MM + OUT_MM + MIN_ENGAGEMENT_MM
     screw, washer, nut = choose_screw(parts, M5_MM, length), parts[WASHER], parts[NUT]
     bracket, plate = ("camera_bracket",), ("camera_plate",)
@@ -259,7 +255,7 @@ def _plate(place: _Place) -> Component:
     """The plate that carries the camera: inserts for three screws, slots for tripod and fence."""
     near, far = place.radius, place.radius + PLATE_MM
     through = (near - THROUGH_MM, far + THROUGH_MM)
-    screw, recess = place.frame.camera_screw_mm, place.recess
+    screw, recess = place.spec.frame.camera_screw_mm, place.recess
     tripod = place.point(screw, 0.0, through[0])
     depth = (through[1] - through[0]) * place.own[2]
     removed: list[Primitive] = [
@@ -298,7 +294,7 @@ def _fence(place: _Place) -> Component:
 
 def _bracket(place: _Place) -> Bracket:
     """The bracket on the base plate: slots across for three screws, a window for the key."""
-    frame, axes, low = place.frame, place.axes, place.frame.floor_mm
+    frame, axes, low = place.spec.frame, place.axes, place.spec.frame.floor_mm
     near, far = place.bracket_at, place.bracket_at + frame.flange_mm
 
     def at(back: float, out: float) -> Floats:
@@ -346,7 +342,7 @@ def _bracket(place: _Place) -> Bracket:
 
 
 def _check_camera(place: _Place) -> None:
-    frame, along = place.frame, place.along
+    frame, along = place.spec.frame, place.along
     length = place.spec.camera_length_mm
     if abs(float(place.camera.forward @ place.axes[1])) > AXIAL:
         raise SpecError(
@@ -399,10 +395,4 @@ def camera_step(machine: AssembledMachine) -> Words:
     return does, checks
 
 
-CAMERA = Part(
-    (camera_step,),
-    camera_mount,
-    remedies={
-        "camera*": "prototype.frame.camera_screw_mm larger or prototype.camera_diameter_mm smaller"
-    },
-)
+CAMERA = Part((camera_step,), camera_mount, remedies={"camera*": REMEDY})

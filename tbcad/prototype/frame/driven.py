@@ -2,14 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tbcad.cad.drafting.dimensions import across, centre_cross, diameter
 from tbcad.cad.drafting.sheet import A4, BESIDE_MM, Sheet, drawing_room, notes, placed, sheet_frame
 from tbcad.cad.formats.entities import Circle, Layer, Point
-from tbcad.core.geometry.primitives import Component, Cylinder, box, cylinder_between
+from tbcad.core.geometry.primitives import Component, Cylinder, box
 from tbcad.core.geometry.rotations import bolt_circle
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.base.fasteners import COUPLING_FLANGE_MM
@@ -25,12 +24,9 @@ from tbcad.prototype.frame.shared import (
     THROUGH_MM,
     HeadPlate,
 )
-from tbcad.prototype.part import Part, Site
+from tbcad.prototype.part import FrameLayout, Part, Site
 from tbcad.prototype.purchased.parts import PurchasedPart, choose_screw
 from tbcad.prototype.sheets import ASIDE_MM, fitted, title_block
-
-if TYPE_CHECKING:
-    from tbcad.prototype.arrangement import PrototypeModel
 
 COUPLING_MM = 14.0  # length of a flange coupling with its gap to the motor; no list gives it
 COUPLING_COLLAR_MM = 10.0  # diameter of its collar; see tbcad.prototype.base.hub
@@ -41,6 +37,7 @@ SHAFT_END_MM = 2.0  # of the collar's bore beyond the shaft
 STAGE_HEIGHT_MM, STAGE_TOP_MM, STAGE_GAP_MM = 40.0, 12.0, 0.5
 MOTOR_THREAD_MM = 3.0  # length of a screw in the motor
 WHEEL = "drawing_wheel"
+REMEDY = "prototype.largest_ball_mm smaller, or use a drive with a longer belt or a direct one"
 NOTES_MM = 85.0  # width of the notes' column on A4
 NEAR_SHAFT = ("carrier", "bearing_head", "wheel")
 
@@ -84,10 +81,7 @@ def purchased_components(
 def _hub_screw_holes(base: BaseLayout, length: float, diameter: float) -> tuple[Cylinder, ...]:
     """Holes for the screws into the hub, through a body behind it."""
     start, end = base.hub.mount + THROUGH_MM, base.hub.mount - length - THROUGH_MM
-    return tuple(
-        cylinder_between(base.point(start, x, y), base.point(end, x, y), diameter / 2)
-        for x, y in base.hub.holes.tolist()
-    )
+    return tuple(base.cylinder(start, end, diameter / 2, x, y) for x, y in base.hub.holes.tolist())
 
 
 def _ring(
@@ -366,15 +360,12 @@ def _called(circle: Circle, corner: Point) -> tuple[Point, Point]:
     return tip, place
 
 
-def _sheets(model: "PrototypeModel", bill: PartsList) -> tuple[Sheet, ...]:
-    return (wheel_sheet(model.base, model.drive.wheel, bill),) if model.drive.wheel else ()
+def _sheets(site: Site, _: FrameLayout, bill: PartsList) -> tuple[Sheet, ...]:
+    return (wheel_sheet(site.base, site.drive.wheel, bill),) if site.drive.wheel else ()
 
 
 DRIVE = Part(
     (table_step, hub_step, shaft_step, motor_step),
     sheets=_sheets,
-    remedies=dict.fromkeys(
-        ("motor", "pinion"),
-        "prototype.largest_ball_mm smaller, or use a drive with a longer belt or a direct one",
-    ),
+    remedies={"motor": REMEDY, "pinion": REMEDY},
 )

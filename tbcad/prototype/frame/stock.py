@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -46,9 +45,6 @@ from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import PurchasedPart, choose_part, choose_screw, of_kind
 from tbcad.prototype.sheets import fitted, outer, title_block
 from tbcad.types import Floats
-
-if TYPE_CHECKING:
-    from tbcad.prototype.arrangement import PrototypeModel
 
 M5_HOLE_MM = CLEARANCE_HOLE_MM[5.0]
 
@@ -376,8 +372,8 @@ def _heights(
         yield across((x, high), (at, high), high + level * LEVEL_MM, f"{height:.1f}")
 
 
-def _sheets(model: "PrototypeModel", bill: PartsList) -> tuple[Sheet, ...]:
-    stock, lamps = model.frame.of(Stock), model.frame.find(LampLayout)
+def _sheets(_: Site, frame: FrameLayout, bill: PartsList) -> tuple[Sheet, ...]:
+    stock, lamps = frame.of(Stock), frame.find(LampLayout)
     return plate_sheet(stock, bill), upright_sheet(stock, lamps.screws if lamps else (), bill)
 
 

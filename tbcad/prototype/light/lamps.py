@@ -8,7 +8,6 @@ and on a bridge over the camera: decision 0014.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -44,9 +43,6 @@ from tbcad.prototype.light.lamp import (
 from tbcad.prototype.part import FrameLayout, Part, Site
 from tbcad.prototype.sheets import fitted, outer, title_block
 from tbcad.types import Floats
-
-if TYPE_CHECKING:
-    from tbcad.prototype.arrangement import PrototypeModel
 
 # By how much level lamps are beside the plane y = 0: where the base hides one side, the other.
 ASIDE_MM = (0.0, -5.0, 5.0, -10.0, 10.0, -15.0, 15.0)
@@ -246,8 +242,8 @@ def _place_note(lamps: LampLayout) -> str:
     )
 
 
-def _sheets(model: "PrototypeModel", bill: PartsList) -> tuple[Sheet, ...]:
-    lamps = model.frame.find(LampLayout)
+def _sheets(_: Site, frame: FrameLayout, bill: PartsList) -> tuple[Sheet, ...]:
+    lamps = frame.find(LampLayout)
     return (lamp_sheet(lamps, bill),) if lamps else ()
 
 
