@@ -217,9 +217,9 @@ def wiring_layout(site: Site, before: FrameLayout) -> Wiring:
         listed |= {circuit.resistor.part.name: len(leds), circuit.connector.name: 1}
         listed |= {circuit.wire.name: metres}
     rows += [RELEASE] if motion.trigger == "coolant" else []
-    motor = {"part": site.drive.motor.name, "output": f"driver {motion.axis}"}
+    motor: Row = {"part": site.drive.motor.name, "output": f"driver {motion.axis}"}
     # A rotary stage's current is its maker's.
-    rated = {"current_ma": site.drive.of_motor("rated_a") * MA_PER_A or None}
+    rated: Row = {"current_ma": site.drive.of_motor("rated_a") * MA_PER_A or None}
     rows += [HOME | {"output": f"limit {motion.axis}"}, MOTOR | motor | rated, SUPPLY]
     on_cable = sum(float(row["length_mm"] or 0) for row in rows if row.get("wire") == CABLE)
     empty: Row = dict.fromkeys(WiringRow.columns())

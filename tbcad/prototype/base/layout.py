@@ -115,8 +115,8 @@ class BaseLayout:
         self, start: float, end: float, radius: float, out: float = 0.0, side: float = 0.0
     ) -> Cylinder:
         """A cylinder between two places along the axis, or beside it, mm."""
-        ends = (self.point(along, out, side) for along in (start, end))
-        return cylinder_between(*ends, radius)
+        first, last = (self.point(along, out, side) for along in (start, end))
+        return cylinder_between(first, last, radius)
 
 
 def base_layout(spec: BaseSpec, prototype: PrototypeLayout) -> BaseLayout:
