@@ -147,9 +147,10 @@ class TestMagnets:
             base_layout(weak, paper_prototype)
 
     def test_a_quick_base_needs_more_and_glue_holds(self, small_prototype: PrototypeLayout) -> None:
-        quick = load_spec(None, ["n=6", "prototype.k=4", "acceleration_deg_s2=500"])
+        quick = load_spec(None, ["n=6", "prototype.k=4", "acceleration_deg_s2=2000"])
+        base = base_layout(BaseSpec(), small_prototype)
         some = (replace(small_prototype, spec=quick), small_prototype)
-        rows = (held(BaseSpec(), one) for one in some)
+        rows = (holding(base, one, load_parts()).balls for one in some)
         for more, less in zip(*rows, strict=True):
             assert more.force_needed_n > less.force_needed_n
         for one in held(BaseSpec(hold="glue"), small_prototype):
