@@ -17,14 +17,13 @@ import tbcad
 from tbcad.app.cli.app import app
 from tbcad.app.cli.help_texts import HEADINGS
 from tbcad.app.reference.keys import design_template
-from tbcad.prototype import electronics
 from tbcad.prototype.files import bom
 from tbcad.records.calibration import CalibrationRecord, MachineRecord
 from tbcad.records.design import DesignRecord
 from tbcad.records.document import Document, Manifest
 from tbcad.records.prototype import Prototype
 from tbcad.records.run import Exposure, RunRecord
-from tbcad.records.tables import BallRow, MirrorRow, PictureRow, RayRow, StopRow
+from tbcad.records.tables import BallRow, MirrorRow, PictureRow, RayRow, StopRow, WiringRow
 
 ROOT = Path(__file__).parents[2]
 RECORDS: dict[str, type[Document]] = {
@@ -44,7 +43,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "stops.csv": StopRow,
     "rays.csv": RayRow,
 }
-PAPER = {"bom.csv": bom.COLUMNS, "wiring.csv": electronics.COLUMNS}  # read by people
+PAPER = {"bom.csv": bom.COLUMNS, "wiring.csv": WiringRow.columns()}  # read by people
 MARKUP = re.compile(r"\[/?[a-z]+\]")  # of rich, in help texts
 
 

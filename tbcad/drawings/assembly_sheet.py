@@ -140,7 +140,9 @@ def draw_assembly(export: DrawnExport) -> list[Sheet]:
     assert machine is not None
     path = export.file(machine.record.assembly.glb)
     parts = {**machine.bodies, **{one.name: one.part for one in machine.fasteners}}
-    listed = {part: (item, machine.quantities[part]) for part, item in machine.items.items()}
+    listed = {
+        part: (item, machine.bill.quantities[part]) for part, item in machine.bill.items.items()
+    }
     return assembly_sheets(path, parts, listed, export.title)
 
 

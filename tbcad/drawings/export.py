@@ -45,7 +45,7 @@ class DrawnExport:
 
     def row(self, part: PrintedPartRecord) -> Row:
         """A printed part's row in the parts list. InputError: it has none."""
-        for row in self.machine.rows if self.machine else ():
+        for row in self.machine.bill.rows if self.machine else ():
             if row["part"] == part.listed_name:
                 return row
         raise InputError(f"{self.folder / 'bom.csv'} has no {part.listed_name}: {AGAIN}")

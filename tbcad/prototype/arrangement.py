@@ -17,17 +17,10 @@ from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.section import AUTO
 from tbcad.core.spec.sizes import led_places
-from tbcad.prototype.balls.layout import (
-    BallChoices,
-    PrototypeLayout,
-    ball_counts,
-    prototype_layout,
-)
+from tbcad.prototype.balls.layout import BallChoices, PrototypeLayout, ball_counts, prototype_layout
 from tbcad.prototype.base.caps import cap_magnets
 from tbcad.prototype.base.fasteners import base_fasteners
-from tbcad.prototype.base.holding import base_motion
-from tbcad.prototype.base.layout import BaseLayout, base_layout
-from tbcad.prototype.base.mass import carrier_masses
+from tbcad.prototype.base.layout import BaseLayout, base_layout, carrier_masses
 from tbcad.prototype.base.split import BaseSplit, split_base
 from tbcad.prototype.drive.balance import (
     OVERTRAVEL_DEG,
@@ -38,12 +31,14 @@ from tbcad.prototype.drive.balance import (
     sum_masses,
 )
 from tbcad.prototype.drive.drive import Drive, base_torques, choose_drive, load_drives
-from tbcad.prototype.electronics import Wiring, wiring_layout
+from tbcad.prototype.electronics import led_circuit
 from tbcad.prototype.fasteners import Fastener, numbered
-from tbcad.prototype.frame.camera_gauge import CameraGauge
-from tbcad.prototype.frame.layout import FrameLayout, frame_layout, frame_purchased_parts
+from tbcad.prototype.frame.layout import frame_layout
+from tbcad.prototype.frame.stock import Stock
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
+from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout, shroud_layout
+from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.purchased.parts import Parts, load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_fasteners, stage_layout
 
@@ -54,25 +49,15 @@ OPEN_BASE_KEYS = ("pad_angle_deg", "hold", "hub_boss_mm")
 """Keys of the section [prototype.base] that an arrangement chooses where they are "auto"."""
 
 
-@dataclass(frozen=True)
-class PrototypeModel:
-    """A prototype: all its layouts, and its printed parts once they are built."""
+@dataclass(frozen=True, kw_only=True)
+class PrototypeModel(Site):
+    """A prototype: all its layouts, a value for every key, and its printed parts once built."""
 
-    spec: Spec  # with a value for every key
-    layout: PrototypeLayout  # balls, their places, the plan of the stops
-    base: BaseLayout  # layout of the carrier
     split: BaseSplit  # how the carrier is cut to fit the bed
     # of what turns with the base; the carrier's mass is an estimate until it is built
     balance: BaseBalance
-    drive: Drive  # that turns it
-    keep_out: KeepOut  # what static parts must keep out of
-    stage: StageLayout  # layout of the object stage
-    wiring: Wiring  # of lamp and LEDs
     frame: FrameLayout  # layout of what holds stage, base and camera
     shroud: ShroudLayout | None  # round the rig, None without
-    parts: Parts  # lists of purchased parts
-    # that shows where the camera's pinhole is; None without a camera, or unbuilt
-    gauge: CameraGauge | None = None
     printed: "tuple[PrintedPart, ...]" = ()  # all printed parts, when they are built
 
     @cached_property
@@ -92,8 +77,8 @@ class PrototypeModel:
     def purchased(self) -> dict[str, int]:
         """Quantity of purchased parts by name, without balls and drive."""
         counts = Counter(one.part.name for one in self.fasteners)
-        counts.update(frame_purchased_parts(self.frame))
-        counts.update(self.wiring.purchased(self.frame.lamps))
+        for one in self.frame.mounted:
+            counts.update(one.listed)
         if self.shroud:
             counts[self.shroud.sheet.name] += self.shroud.sheets
         return counts
@@ -159,7 +144,7 @@ def _base_attempts(spec: Spec, layout: PrototypeLayout, parts: Parts) -> Iterato
         for angle in section.pad_angles_deg:
             chosen = _with_base(spec, hold=hold, pad_angle_deg=angle)
             try:
-                base_layout(chosen.prototype.base, layout, base_motion(chosen))
+                base_layout(chosen.prototype.base, layout)
             except SpecError as error:
                 yield chosen, error
             else:
@@ -179,7 +164,7 @@ def _frame_attempts(
     """
     for boss in spec.prototype.base.hub_bosses_mm:
         chosen = _with_base(spec, hub_boss_mm=boss)
-        base = base_layout(chosen.prototype.base, layout, base_motion(chosen))
+        base = base_layout(chosen.prototype.base, layout)
         carrier = carrier_masses(base, spec.printer.density_g_cm3)
         try:
             estimate = balance_and_drive(layout, base, carrier, chosen, parts)
@@ -188,13 +173,21 @@ def _frame_attempts(
             yield chosen, error
             return False
         try:
-            chosen, stage, wiring = _staged(chosen, layout, keep_out, parts)
+            chosen, stage = _staged(chosen, layout, keep_out, parts)
         except SpecError as error:  # whatever the boss
             yield chosen, error
             return True
+        site = Site(
+            spec=chosen,
+            layout=layout,
+            base=base,
+            drive=estimate[1],
+            keep_out=keep_out,
+            stage=stage,
+            parts=parts,
+        )
         try:
-            staged = stage, wiring
-            arrangement = _arranged(chosen, layout, base, estimate, keep_out, staged, parts)
+            arrangement = _arranged(site, estimate[0])
         except SpecError as error:
             yield chosen, error
         else:
@@ -205,12 +198,13 @@ def _frame_attempts(
 
 def _staged(
     spec: Spec, layout: PrototypeLayout, keep_out: KeepOut, parts: Parts
-) -> tuple[Spec, StageLayout, Wiring]:
+) -> tuple[Spec, StageLayout]:
     """The stage, without LEDs where those in the automatic places cannot be used or wired."""
     section = spec.prototype.stage
     try:
         stage = stage_layout(spec.prototype, layout, keep_out, parts)
-        return spec, stage, wiring_layout(spec.prototype, stage, parts)
+        led_circuit(spec.prototype, stage, parts)
+        return spec, stage
     except SpecError:
         if not section.leds_mm or section.leds_mm != led_places(spec.optics.capture_diameter_mm):
             raise
@@ -236,43 +230,23 @@ def _keep_out(spec: Spec, layout: PrototypeLayout, base: BaseLayout) -> KeepOut:
     return keep_out_volume(layout, base, spec.optics.capture_diameter_mm / 2, approach)
 
 
-def _arranged(
-    spec: Spec,
-    layout: PrototypeLayout,
-    base: BaseLayout,
-    estimate: tuple[BaseBalance, Drive],
-    keep_out: KeepOut,
-    staged: tuple[StageLayout, Wiring],
-    parts: Parts,
-) -> PrototypeModel:
-    (balance, drive), (stage, wiring) = estimate, staged
-    frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
-    shroud = shroud_round(spec, stage, frame, keep_out, parts)
-    lamp_z = float(frame.lamps.places[0, 2]) if frame.lamps else 0.0
+def _arranged(site: Site, balance: BaseBalance) -> PrototypeModel:
+    spec, frame = site.spec, frame_layout(site)
+    shroud, lamps = shroud_round(site, frame), frame.find(LampLayout)
+    lamp_z = float(lamps.places[0, 2]) if lamps else 0.0
     light = {"lamp_z_mm": lamp_z, "shroud": shroud is not None}
-    return PrototypeModel(
-        spec=_with(spec, light=spec.prototype.light.model_copy(update=light)),
-        layout=layout,
-        base=base,
-        split=split_base(base, spec.printer),
-        balance=balance,
-        drive=drive,
-        keep_out=keep_out,
-        stage=stage,
-        wiring=wiring,
-        frame=frame,
-        shroud=shroud,
-        parts=parts,
-    )
+    known = vars(site) | {
+        "spec": _with(spec, light=spec.prototype.light.model_copy(update=light)),
+        "split": split_base(site.base, spec.printer),
+    }
+    return PrototypeModel(**known, balance=balance, frame=frame, shroud=shroud)
 
 
-def shroud_round(
-    spec: Spec, stage: StageLayout, frame: FrameLayout, keep_out: KeepOut, parts: Parts
-) -> ShroudLayout | None:
+def shroud_round(site: Site, frame: FrameLayout) -> ShroudLayout | None:
     """The shroud round stage, frame and base; SpecError when no sheet is large enough."""
-    static = (*stage.components, *frame.printed, *frame.purchased)
-    floor = spec.prototype.frame.floor_mm - frame.plate["thickness_mm"]
-    return shroud_layout(spec.prototype.light, static, keep_out, floor, parts)
+    static, spec = (*site.stage.components, *frame.printed, *frame.purchased), site.spec.prototype
+    floor = spec.frame.floor_mm - frame.of(Stock).plate["thickness_mm"]
+    return shroud_layout(spec.light, static, site.keep_out, floor, site.parts)
 
 
 def _remedy(design: MirrorDesign, tried: list[int]) -> str:

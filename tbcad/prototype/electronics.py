@@ -11,7 +11,6 @@ Sources: grblHAL core gcode.c and issue 633; LinuxCNC M-codes, M62 to M65.
 """
 
 import math
-from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,12 +19,14 @@ from tbcad.cad.formats.checked_files import Row
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import MotionSpec, PrototypeSpec, StageSpec
-from tbcad.prototype.drive.drive import Drive
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.light.lamp import LampLayout
+from tbcad.prototype.part import FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
 from tbcad.prototype.stage import crown
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.records.prototype_drive import Phase
+from tbcad.records.tables import WiringRow
 
 LAMP_OUTPUT, LAMP = 0, "lamp"
 MAX_OUTPUTS = 8  # digital outputs that FluidNC has, and boards with grblHAL have at most
@@ -37,11 +38,8 @@ E24 = (
 )
 DERATING = 2.0  # rated power over dissipated power, so that a resistor stays below 100 degrees C
 ROUNDING = 1e-9
-COLUMNS = (
-    *("line", "signal", "part", "output", "on", "off", "connector", "pins", "supply_v"),
-    *("forward_v", "resistor", "resistor_ohm", "current_ma", "dissipation_w", "wire"),
-    *("length_mm", "path"),
-)
+DIGITAL = "digital"
+OWN_WIRES = ("motor", "supply")  # lines whose way is told instead of an output
 MAX_FILL = 0.5  # of a bore's section by wires as squares, so that they can be pulled through
 LEAD_MM = 1000.0  # from the foot of the stage to the controller
 CHANNEL_MM = 45.0  # from the post's axis out of the foot's channel, with room for the connector
@@ -166,85 +164,70 @@ def _rated(watts: float, parts: Parts) -> PurchasedPart:
 
 
 @dataclass(frozen=True)
-class Wiring:
-    """The electronics of a stage."""
+class LedCircuit:
+    """What the LEDs, which are alike, are connected by."""
 
-    lights: dict[str, int]  # that the controller switches, and their outputs
-    leds: int  # number of LEDs
-    led: PurchasedPart  # the purchased part
-    supply_v: float  # of lamp and LEDs
-    resistor: SeriesResistor | None  # in series with each LED; None without LEDs
-    connector: PurchasedPart | None  # of the LEDs' cable; None without LEDs
-    wire: PurchasedPart | None  # of the LEDs; None without LEDs
-    lengths: tuple[float, ...]  # of each LED's cable to the controller, mm
-    trigger: bool  # whether a relay releases the camera
-    axis: str  # of the controller
+    resistor: SeriesResistor  # of each
+    connector: PurchasedPart  # of their cable
+    wire: PurchasedPart  # of each
+
+
+def led_circuit(spec: PrototypeSpec, stage: StageLayout, parts: Parts) -> LedCircuit | None:
+    """What connects the LEDs of a stage; None without any.
+
+    SpecError when they are too many, or not to be had with this current, supply or bore.
+    """
+    count, section, key = len(stage.leds), spec.stage, "prototype.stage.leds_mm"
+    lights(count, spec.motion)
+    if not count:
+        return None
+    resistor = series_resistor(stage.led, section.led_ma, section.led_supply_v, parts)
+    hint = f"use fewer LEDs in {key}"
+    connector = choose_part(parts, "connectors", key, hint, "pins", pins=WIRES * count)
+    return LedCircuit(resistor, connector, _wire(section, stage, resistor.current_ma, parts))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wiring(Mounted):
+    """The electronics."""
+
+    # one for each line of the controller: lights by output, release, switch, motor, supply
+    rows: tuple[Row, ...]
+    circuit: LedCircuit | None  # of the LEDs, None without any
 
     @property
     def parts(self) -> Parts:
         """Parts that no list has by this name: the resistor of a value."""
-        return {self.resistor.part.name: self.resistor.part} if self.resistor else {}
-
-    def purchased(self, lamps: LampLayout | None) -> dict[str, int]:
-        """Quantity of purchased parts by name; without LEDs; of wire, in metres."""
-        counts = Counter({SWITCH_MODULE: len(self.lights)})
-        if self.resistor and self.connector and self.wire:
-            counts[self.resistor.part.name] += self.leds
-            counts[self.connector.name] += 1
-            counts[self.wire.name] += math.ceil(WIRES * sum(self.lengths) / METRE_MM)
-        # Of supply, switch and release.
-        cable = (2 + self.trigger) * CABLE_MM + lamp_cable_mm(lamps)
-        counts[CABLE] += math.ceil(cable / METRE_MM)
-        return dict(+counts)
+        return {one.name: one for one in ([self.circuit.resistor.part] if self.circuit else [])}
 
 
-def wiring_layout(spec: PrototypeSpec, stage: StageLayout, parts: Parts) -> Wiring:
-    """The electronics of a stage.
-
-    SpecError when LEDs are too many, or not to be had with this current, supply or bore.
-    """
-    count, section = len(stage.leds), spec.stage
-    resistor = connector = wire = None
-    if count:
-        resistor = series_resistor(stage.led, section.led_ma, section.led_supply_v, parts)
-        hint = "use fewer LEDs in prototype.stage.leds_mm"
-        key, pins = "prototype.stage.leds_mm", WIRES * count
-        connector = choose_part(parts, "connectors", key, hint, "pins", pins=pins)
-        wire = _wire(section, stage, resistor.current_ma, parts)
+def wiring_layout(site: Site, before: FrameLayout) -> Wiring:
+    """The electronics; SpecError as of `led_circuit`."""
+    spec, motion, leds = site.spec.prototype, site.spec.prototype.motion, site.stage.leds
+    circuit, outputs = led_circuit(spec, site.stage, site.parts), lights(len(leds), motion)
     # Of each LED's cable down to its groove, inward, down the post, to the controller.
-    length = norm(stage.leds[:, :2]) + stage.leds[:, 2] - spec.frame.floor_mm
-    length = length + CHANNEL_MM + LEAD_MM + crown.GROOVE_MM
-    return Wiring(
-        lights=lights(count, spec.motion),
-        leds=count,
-        led=stage.led,
-        supply_v=section.led_supply_v,
-        resistor=resistor,
-        connector=connector,
-        wire=wire,
-        lengths=tuple((CUT_MM * np.ceil(length / CUT_MM)).tolist()),
-        trigger=spec.motion.trigger == "coolant",
-        axis=spec.motion.axis,
-    )
-
-
-def lamp_cable_mm(lamps: LampLayout | None) -> float:
-    """Length of the cable to the lamps, mm."""
-    return CABLE_MM + (BETWEEN_LAMPS_MM * (len(lamps.places) - 1) if lamps else 0.0)
-
-
-def wiring_rows(wiring: Wiring, lamps: LampLayout | None, drive: Drive) -> list[Row]:
-    """One row for each line of the controller: lights by output, release, switch, motor, supply."""
-    rows = [_row(_lamp_cells(wiring, lamps), wiring.lights)]
-    rows += [_row(_led_cells(wiring, i), wiring.lights) for i in range(wiring.leds)]
-    if wiring.trigger:
-        rows.append(RELEASE)
-    motor = {"part": drive.motor.name, "output": f"driver {wiring.axis}"}
-    rows.append(HOME | {"output": f"limit {wiring.axis}"})
+    length = norm(leds[:, :2]) + leds[:, 2] - spec.frame.floor_mm
+    length = CUT_MM * np.ceil((length + CHANNEL_MM + LEAD_MM + crown.GROOVE_MM) / CUT_MM)
+    rows = [_row(_lamp_cells(before.find(LampLayout), spec.stage.led_supply_v), outputs)]
+    listed = {SWITCH_MODULE: len(outputs)}
+    if circuit:
+        leds_cells = (_led_cells(site, circuit, i, one) for i, one in enumerate(length.tolist()))
+        rows += [_row(cells, outputs) for cells in leds_cells]
+        metres = math.ceil(WIRES * float(length.sum()) / METRE_MM)
+        listed |= {circuit.resistor.part.name: len(leds), circuit.connector.name: 1}
+        listed |= {circuit.wire.name: metres}
+    rows += [RELEASE] if motion.trigger == "coolant" else []
+    motor: Row = {"part": site.drive.motor.name, "output": f"driver {motion.axis}"}
     # A rotary stage's current is its maker's.
-    rows += [MOTOR | motor | {"current_ma": drive.of_motor("rated_a") * MA_PER_A or None}, SUPPLY]
-    empty: Row = dict.fromkeys(COLUMNS)
-    return [{**empty, **row, "line": number} for number, row in enumerate(rows, 1)]
+    rated: Row = {"current_ma": site.drive.of_motor("rated_a") * MA_PER_A or None}
+    rows += [HOME | {"output": f"limit {motion.axis}"}, MOTOR | motor | rated, SUPPLY]
+    on_cable = sum(float(row["length_mm"] or 0) for row in rows if row.get("wire") == CABLE)
+    empty: Row = dict.fromkeys(WiringRow.columns())
+    return Wiring(
+        listed=listed | {CABLE: math.ceil(on_cable / METRE_MM)},
+        rows=tuple({**empty, **row, "line": number} for number, row in enumerate(rows, 1)),
+        circuit=circuit,
+    )
 
 
 def _row(cells: Row, outputs: dict[str, int]) -> Row:
@@ -256,34 +239,32 @@ def _row(cells: Row, outputs: dict[str, int]) -> Row:
     return {"connector": BOARD, "output": f"digital {output}", "on": on, "off": off, **cells}
 
 
-def _lamp_cells(wiring: Wiring, lamps: LampLayout | None) -> Row:
+def _lamp_cells(lamps: LampLayout | None, supply_v: float) -> Row:
     """The lamps' line; without lamps it is that of a lamp of the user's own."""
-    cable: Row = {"signal": LAMP, "wire": CABLE, "length_mm": lamp_cable_mm(lamps)}
+    cable: Row = {"signal": LAMP, "wire": CABLE, "length_mm": CABLE_MM}
     if lamps is None:
-        return {**cable, "part": "lamp", "supply_v": wiring.supply_v}
+        return {**cable, "part": "lamp", "supply_v": supply_v}
     strip: Row = {"part": lamps.strip.name, "supply_v": lamps.strip["supply_v"]}
-    return {**cable, **strip, "current_ma": lamps.current_ma, "path": LAMP_PATH}
+    length = CABLE_MM + BETWEEN_LAMPS_MM * (len(lamps.places) - 1)
+    more: Row = {"length_mm": length, "current_ma": lamps.current_ma, "path": LAMP_PATH}
+    return {**cable, **strip, **more}
 
 
-def _led_cells(wiring: Wiring, index: int) -> Row:
-    resistor, connector, wire = wiring.resistor, wiring.connector, wiring.wire
-    assert resistor
-    assert connector
-    assert wire
-    first = WIRES * index + 1
+def _led_cells(site: Site, circuit: LedCircuit, index: int, length: float) -> Row:
+    resistor, first = circuit.resistor, WIRES * index + 1
     return {
         "signal": f"led_{index + 1}",
-        "part": wiring.led.name,
-        "connector": connector.name,
+        "part": site.stage.led.name,
+        "connector": circuit.connector.name,
         "pins": f"{first} {first + 1}",  # anode, cathode
-        "supply_v": wiring.supply_v,
-        "forward_v": wiring.led["forward_v"],
+        "supply_v": site.spec.prototype.stage.led_supply_v,
+        "forward_v": site.stage.led["forward_v"],
         "resistor": resistor.part.name,
         "resistor_ohm": resistor.ohm,
         "current_ma": resistor.current_ma,
         "dissipation_w": resistor.dissipation_w,
-        "wire": wire.name,
-        "length_mm": wiring.lengths[index],
+        "wire": circuit.wire.name,
+        "length_mm": length,
         "path": PATH,
     }
 
@@ -304,3 +285,77 @@ def _wire(section: StageSpec, stage: StageLayout, current_ma: float, parts: Part
             "fewer LEDs in prototype.stage.leds_mm, or set it to []"
         )
     return max(fitting, key=lambda wire: wire["outer_mm"])
+
+
+@planned("Wiring", loose=("electronics", "wires", "connectors", "resistors"))
+def wiring_step(machine: AssembledMachine) -> Words:
+    """Lines of the controller, one each; without lamps, where light comes from instead."""
+    does = [
+        "Controller, supply, relay and switch modules stand outside the shroud. Supply off.",
+        "Plus of the supply goes to each lamp, and through its resistor to each LED's anode (odd "
+        "pin). Their other ends (an LED's cathode: even pin) go to the drain of a switch module, "
+        "whose input is the controller's output.",
+        *(_line(machine, row) for row in machine.wiring),
+        when(
+            not machine.record.lamps,
+            "This design has no place for lamps of its own, and none are in the list: buy two "
+            "small ones alike, for 24 V and 2 W each, and connect both to line 1. Fasten them "
+            "lower than the object and in the middle of the machine, one toward the camera and one "
+            "toward the uprights, as far from the object, out of the camera's picture of balls and "
+            "out of the base's way (turn it by hand). They light it alike before and after its "
+            "half turn. Without them no photograph shows the object.",
+        ),
+        "Never plug or unplug the motor with the supply on: that destroys drivers, and the base "
+        "falls. Zero pin in before the supply is switched off. No wire goes to the base.",
+    ]
+    checks = [
+        "Before the supply is on: between its plus and minus, behind the fuse, are more than 100 "
+        "ohm, and a few ohm between the two wires of each of the motor's coils.",
+        "With the supply on, no part gets warm and no LED lights.",
+        *(
+            f"{row.on} switches {row.signal.replace('_', ' ')} on, {row.off} off."
+            for row in machine.wiring
+            if row.on
+        ),
+    ]
+    return does, checks, ["Solder or crimp all joints, and insulate each one."]
+
+
+def _line(machine: AssembledMachine, row: WiringRow) -> str:
+    """A line of wiring.csv in words."""
+    line, part = f"Line {row.line}, {row.signal.replace('_', ' ')}:", machine.ref(row.part)
+    if row.signal in OWN_WIRES:
+        rated = f", {row.current_ma:.0f} mA RMS" if row.current_ma else ""
+        return f"{line} {part}{rated}; {row.path}."
+    through = f" through {machine.ref(row.resistor)}" if row.resistor else ""
+    pins = f", pins {row.pins.replace(' ', ' and ')} of {row.connector}" if row.pins else ""
+    switched = when(row.output.startswith(DIGITAL), " by a switch module")
+    way = when(row.path and not row.resistor, f"; {row.path}")
+    return f"{line} {part}{through}{pins}, at {row.output}{switched}{way}."
+
+
+@planned("First photographs")
+def first_step(machine: AssembledMachine) -> Words:
+    """The program's first run."""
+    phases = machine.record.controller.phases
+    low, high = machine.record.swing_deg
+    names = ", ".join(one.name.replace("_", " ") for one in phases)
+    does = [
+        "Object on the disc, shroud closed. tbcad run drives machine and camera and keeps the "
+        "photographs; any G-code sender runs rotation_plan.nc with the camera on the relay.",
+        f"At each stop it takes {len(phases)} photographs: {names}.",
+        "When the program waits, turn the disc with the object by 180 degrees and let it go on.",
+    ]
+    checks = [
+        f"The base swings from {low:.0f} to {high:.0f} degrees and touches nothing. The first "
+        "time, keep a hand at Ctrl-C of tbcad run, or at the sender's feed hold (Klipper: pause), "
+        "which stop it with the motor on. The supply's switch, an emergency stop in it, its plug "
+        "and its fuse let it fall.",
+        "The number of photographs is the same in both runs.",
+        "Afterwards the base is at zero and the zero pin in, before the supply is switched off.",
+    ]
+    return does, checks
+
+
+WIRING = Part((wiring_step,), wiring_layout)
+FIRST = Part((first_step,))

@@ -16,17 +16,18 @@ from tbcad.core.geometry.primitives import (
 )
 from tbcad.core.geometry.rotations import unit_circle
 from tbcad.core.spec.errors import SpecError
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, PIN_MM, PIN_OUT_MM, SCREW_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drive.balance import HomeAngles
+from tbcad.prototype.drive.balance import HomeAngles, home_angles
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.purchased import (
+from tbcad.prototype.frame.shared import (
     ENGAGEMENT_MM,
     THROUGH_MM,
+    BearingHead,
     HeadPlate,
-    axial_cylinder,
-    hub_point,
 )
+from tbcad.prototype.part import FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import Parts, choose_part, choose_screw
 from tbcad.types import Floats
 
@@ -56,6 +57,7 @@ DISC_BELOW_MM = 0.8  # of the disc below the free roller
 BORE_PLAY_MM = 0.5  # on the diameter
 RAMP_DEG, TAB_DEG, MIN_TAB_DEG = 5.0, 30.0, 6.0
 PART_DEG = 3.0  # of the tab's outline
+MA_PER_A = 1000.0
 FREE_DEG = 30.0  # that tab and switch keep beyond the swing
 TAB_ROOT_MM = 5.0  # by which the tab reaches into the disc
 PIN_GRIP_MM = 10.0  # of the rod beyond the plate
@@ -81,26 +83,23 @@ def tab_radius(half_width: float) -> float:
     return math.hypot(*switch_place(half_width)) - TRIP_MM + TAB_BEYOND_MM
 
 
-@dataclass(frozen=True)
-class HomingLayout:
-    """Zero disc, bracket and switch."""
+@dataclass(frozen=True, kw_only=True)
+class HomingLayout(Mounted):
+    """Zero disc; bracket and switch, printed and purchased."""
 
     angles: HomeAngles  # of homing
     disc: Component  # the printed part that turns with the base
-    bracket: Component  # the printed part on the head's plate
-    switch: Component  # body of the switch, drawn pressed
-    fasteners: tuple[Fastener, ...]  # of bracket and switch
     pin: str  # name of the rod that fixes angle zero
     error_deg: float  # largest error of angle zero from the play of rod and key
 
 
-def homing_layout(
-    base: BaseLayout, plate: HeadPlate, angles: HomeAngles, parts: Parts
-) -> HomingLayout:
+def homing_layout(site: Site, before: FrameLayout) -> HomingLayout:
     """Disc, bracket and switch for a base and the plate behind it.
 
     SpecError when the swing leaves no room for the tab.
     """
+    base, parts, plate = site.base, site.parts, before.of(BearingHead).plate
+    angles = home_angles(site.layout, site.spec.prototype.motion)
     place = _SwitchPlace.beside(base, plate)
     length = base.hub.face - plate.back + PIN_GRIP_MM
     hint = "add a longer one"
@@ -110,9 +109,10 @@ def homing_layout(
     return HomingLayout(
         angles=angles,
         disc=_disc(base, place, angles),
-        bracket=_bracket(base, plate, place),
-        switch=_switch(base, place, parts),
+        printed=(_bracket(base, plate, place),),
+        purchased=(_switch(base, place, parts),),
         fasteners=_fasteners(base, plate, place, parts),
+        listed={pin.name: 1, SWITCH: 1},
         pin=pin.name,
         error_deg=math.degrees(error),
     )
@@ -151,7 +151,7 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
     if place.disc < PIN_OUT_MM + PIN_HOLE_MM / 2 + MIN_EDGE_MM:
         raise SpecError("the zero disc has no room for its pin: make prototype.frame.web_mm larger")
     added: list[Primitive] = [
-        axial_cylinder(base, back, hub.face, place.disc),
+        base.cylinder(back, hub.face, place.disc),
         _prism(base, _tab(place, angles), back, ZERO_DISC_MM),
     ]
     holes = [(0.0, 0.0, 2 * hub.bore + BORE_PLAY_MM), (PIN_OUT_MM, 0.0, PIN_HOLE_MM)]
@@ -165,10 +165,7 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
         )
     low, high = back - THROUGH_MM, hub.face + THROUGH_MM
     removed: list[Primitive] = [
-        cylinder_between(
-            hub_point(base, low, out, side), hub_point(base, high, out, side), diameter / 2
-        )
-        for out, side, diameter in holes
+        base.cylinder(low, high, diameter / 2, out, side) for out, side, diameter in holes
     ]
     rim = rectangle((place.disc - MARK_MM, -MARK_MM / 2), (place.disc + MARK_MM, MARK_MM / 2))
     removed.append(_prism(base, rim, back - THROUGH_MM, ZERO_DISC_MM + 2 * THROUGH_MM))
@@ -183,7 +180,7 @@ def _disc(base: BaseLayout, place: _SwitchPlace, angles: HomeAngles) -> Componen
 
 def _prism(base: BaseLayout, polygon: Floats, back: float, height: float) -> Prism:
     """A convex polygon (n, 2) of (out, side) across the axis."""
-    corners = np.array([hub_point(base, back, out, side) for out, side in polygon.tolist()])
+    corners = np.array([base.point(back, out, side) for out, side in polygon.tolist()])
     return Prism(corners, height * base.frame[0])
 
 
@@ -209,13 +206,13 @@ def _tab(place: _SwitchPlace, angles: HomeAngles) -> Floats:
 def _bracket(base: BaseLayout, plate: HeadPlate, place: _SwitchPlace) -> Component:
     """A block on the plate's side, as high as the disc, that the switch lies on."""
     near, far, side = plate.half_width, plate.half_width + BRACKET_MM, base.frame[2]
-    low = np.array([plate.back, BRACKET_LOW_MM, near])
-    body = box(low, np.array([place.low, BRACKET_HIGH_MM, far]), base.frame)
+    high = place.low, BRACKET_HIGH_MM, far
+    body = box((plate.back, BRACKET_LOW_MM, near), high, base.frame)
     removed: list[Primitive] = []
     for out in bracket_screws():
         middle = plate.back + (plate.front - plate.back) / 2
-        inner = hub_point(base, middle, out, near - THROUGH_MM)
-        outer = hub_point(base, middle, out, far + THROUGH_MM)
+        inner = base.point(middle, out, near - THROUGH_MM)
+        outer = base.point(middle, out, far + THROUGH_MM)
         removed.append(cylinder_between(inner, outer, SCREW_MM / 2))
     axes = place.axes(base)
     for around in HOLES_MM:
@@ -235,7 +232,7 @@ def _fasteners(
     middle, far = plate.back + (plate.front - plate.back) / 2, plate.half_width + BRACKET_MM
     axes, through = place.axes(base), ("home_bracket", "bearing_head")
     on_head = [
-        Fastener(bracket, hub_point(base, middle, out, far), -base.frame[2], through)
+        Fastener(bracket, base.point(middle, out, far), -base.frame[2], through)
         for out in bracket_screws()
     ]
     top = place.low + SWITCH_MM
@@ -268,3 +265,87 @@ def _switch(base: BaseLayout, place: _SwitchPlace, parts: Parts) -> Component:
     starts = (at(0.0, around, -THROUGH_MM) @ axes for around in HOLES_MM)
     holes = tuple(Cylinder(start, axes[2], SWITCH_HOLE_MM / 2, depth) for start in starts)
     return Component("home_switch", parts[SWITCH].what, added, holes, part=SWITCH)
+
+
+@planned("Switch and zero pin", "home_*", loose=("shafts",), near=("zero_disc",))
+def homing_step(machine: AssembledMachine) -> Words:
+    """Switch, bracket and the zero pin."""
+    home = machine.record.home
+    does = [
+        "Screw the switch on its bracket, the roller toward the axis. Screw the bracket on the "
+        "head's side.",
+        "Turn the base by hand until the marks of disc and head are in line, and push the zero pin "
+        f"{machine.ref(home.pin)} from behind through the head into the disc. That is base angle "
+        "zero.",
+        "Leave the zero pin in until the motor holds the base: without both, the base turns down "
+        "and its balls strike what stands below."
+        if machine.has("motor")
+        else "Pull the zero pin out again.",
+    ]
+    checks = [
+        f"The zero pin of {PIN_MM:g} mm goes through head and disc without force.",
+        "Turned by hand against the arrow, the base clicks the switch at about "
+        f"{abs(home.switch_deg):.0f} degrees from zero.",
+    ]
+    return does, checks
+
+
+@planned("Angle zero")
+def zero_step(machine: AssembledMachine) -> Words:
+    """Settings, homing and the trim."""
+    drive, home, off = machine.record.drive, machine.record.home, machine.record.power_off
+    current = drive.hold_current_a
+    homes = machine.record.controller.firmware == "grblhal"
+    rated = next((row.current_ma for row in machine.wiring if row.signal == "motor"), None)
+    of_motor = f", {rated / MA_PER_A:.1f} A," if rated else ""
+    does = [
+        when(
+            current,
+            f"Set the driver to the motor's rated current{of_motor} while it turns, and "
+            f"{current:.2f} A (root mean square) at rest (IRUN and IHOLD of Trinamic drivers).",
+        ),
+        "Send grbl_settings.txt line by line from a G-code sender. With Klipper include "
+        "klipper.cfg instead, fill in the board's pins, and print rotation_plan_klipper.gcode.",
+        when(
+            homes,
+            "grblHAL starts in alarm when its inputs for reset, emergency stop and door are empty: "
+            "send $14=73 then, which inverts them.",
+        ),
+        f"{when(homes, 'Unlock the controller by $X. ')}Jog by 0.1 degrees, so that the motor "
+        "holds the base (if not, change $4), and pull the zero pin out. Jog a little in the "
+        "positive direction. If the base turns against the disc's arrow, set $3 as the file's "
+        "comment says.",
+        "Home ($H), send the program's line G92, and jog until the zero pin goes in. The angle "
+        "that the controller shows, with a changed sign, is prototype.motion.home_trim_deg: build "
+        "again with it."
+        if homes
+        else "Jog until the zero pin goes in, and switch the controller on there: that is its "
+        "zero.",
+        "Pull the zero pin out, and keep the motor powered. Before the supply is switched off or "
+        "unplugged, its fuse taken out, or the controller reset or restarted, send the base to "
+        "zero and put the pin in.",
+        when(
+            off.fall_energy_j,
+            "Nothing but the motor's current holds the base while the pin is out. If the supply "
+            "fails, the base falls and strikes the end of its travel with up to "
+            f"{off.fall_energy_j:.1f} J at {off.fall_speed_deg_s:.0f} degrees a second: keep hands "
+            "out of its way, and use an uninterruptible supply for controller and motor. The pin "
+            f"bears {off.pin_force_n:.0f} N of gravity at most, {off.pin_pressure_mpa:.1f} MPa in "
+            f"its printed hole ({off.pin_pressure_limit_mpa:.0f} are allowed).",
+        ),
+    ]
+    checks = [
+        when(
+            homes,
+            "Before $H: the controller's report (send ?) has Pn with the axis's letter while the "
+            "switch is pressed by hand, and only then.",
+        ),
+        when(homes, f"Homed, the base stops at {home.homed_deg:.1f} degrees, again and again."),
+        f"Sent to zero, the zero pin goes in: the error is at most {home.zero_error_deg:.1f} "
+        "degrees.",
+    ]
+    return does, checks
+
+
+HOMING = Part((homing_step,), homing_layout)
+ZERO = Part((zero_step,))

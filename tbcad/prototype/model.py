@@ -12,15 +12,10 @@ from tbcad_verify.run.processes import at_once
 
 from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.common.schedule import Submit
-from tbcad.core.camera.requirements import camera_requirements
 from tbcad.core.geometry.primitives import Component
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.arrangement import (
-    PrototypeModel,
-    balance_and_drive,
-    shroud_round,
-)
+from tbcad.prototype.arrangement import PrototypeModel, balance_and_drive, shroud_round
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.coupon import coupon_plates
 from tbcad.prototype.base.coupon_seats import expected_downs, worst_pose
@@ -28,10 +23,10 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.seat_solids import cap_parts
 from tbcad.prototype.base.solid import carrier_parts
 from tbcad.prototype.drive.balance import PointMasses
-from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge
-from tbcad.prototype.frame.layout import FrameLayout, frame_layout
-from tbcad.prototype.printed import PlacedSolid, PrintedPart, Role, placed_components
+from tbcad.prototype.electronics import Wiring
+from tbcad.prototype.frame.layout import frame_layout
+from tbcad.prototype.homing import HomingLayout
+from tbcad.prototype.printed import PlacedSolid, PrintedPart, Role, placed_component
 from tbcad.types import Progress
 
 # Arrangements whose solids are tried, and how many of them with the same number of balls.
@@ -78,33 +73,35 @@ def _model(arrangement: PrototypeModel, progress: Progress, submit: Submit) -> P
     spec, layout, base = arrangement.spec, arrangement.layout, arrangement.base
     progress("prototype: base")
     carrier, coupons, on_stage = _base_and_stage(arrangement, submit)
-    disc = _placed([arrangement.frame.homing.disc], spec)[0]
+    disc = _placed([arrangement.frame.of(HomingLayout).disc], spec)[0]
     turning = [*carrier, disc]
     mass = np.array([part.mass_g(spec.printer.density_g_cm3) for part in turning])
     masses = PointMasses(mass, np.array([part.properties.centroid for part in turning]))
     balance, drive = balance_and_drive(layout, base, masses, spec, arrangement.parts)
     progress("prototype: stage and frame")
     if drive != arrangement.drive:  # the mass of the solids asks for another
-        arrangement = _with_drive(arrangement, drive)
-        disc = _placed([arrangement.frame.homing.disc], spec)[0]
-    frame, gauge = arrangement.frame, _gauge(spec, layout, base, arrangement.frame)
+        arrangement = replace(arrangement, drive=drive)
+        frame = frame_layout(arrangement)
+        shroud = shroud_round(arrangement, frame)
+        arrangement = replace(arrangement, frame=frame, shroud=shroud)
+        disc = _placed([frame.of(HomingLayout).disc], spec)[0]
+    frame, stage = arrangement.frame, arrangement.stage.components
     half = len(frame.printed) // 2  # the other process is idle: coupons and stage are built
     rest = submit(parts_or_error, _placed, frame.printed[half:], spec)
     on_frame = _placed(frame.printed[:half], spec)
-    tools = [gauge.component] if gauge else []
-    on_tools = _placed(tools, spec)
+    on_tools = _placed(frame.tools, spec)
     progress("prototype: caps and coupon")
     printed = (
         *_carrier(base, carrier),
-        PrintedPart(disc, "base", frame.homing.disc.what),
+        PrintedPart(disc, "base", frame.of(HomingLayout).disc.what),
         *_caps(base, layout, spec.mesh.structure_error_mm),
-        *_components("stage", arrangement.stage.components, parts_of(on_stage)),
+        *_components("stage", stage, parts_of(on_stage)),
         *_components("frame", frame.printed, [*on_frame, *parts_of(rest)]),
         *(PrintedPart(part, "tool", COUPON_PURPOSE) for part in parts_of(coupons)),
-        *_components("tool", tools, on_tools),
+        *_components("tool", frame.tools, on_tools),
     )
-    parts = arrangement.parts | arrangement.wiring.parts
-    return replace(arrangement, balance=balance, parts=parts, gauge=gauge, printed=printed)
+    parts = arrangement.parts | frame.of(Wiring).parts
+    return replace(arrangement, balance=balance, parts=parts, printed=printed)
 
 
 def _base_and_stage(
@@ -115,9 +112,7 @@ def _base_and_stage(
     mesh_mm = arrangement.spec.mesh.structure_error_mm
     pose = worst_pose(base, split, expected_downs(base, split))
     coupons = submit(parts_or_error, coupon_plates, base, printer, pose, mesh_mm)
-    on_stage = submit(
-        parts_or_error, placed_components, arrangement.stage.components, printer, mesh_mm
-    )
+    on_stage = submit(parts_or_error, _placed, arrangement.stage.components, arrangement.spec)
     carrier = carrier_parts(base, split, printer, mesh_mm)
     printed_pose = worst_pose(base, split, [-part.axes[:, 2] for part in carrier])
     if not printed_pose.is_like(pose):  # the bed has no room for the pose that was expected
@@ -125,17 +120,9 @@ def _base_and_stage(
     return carrier, coupons, on_stage
 
 
-def _with_drive(arrangement: PrototypeModel, drive: Drive) -> PrototypeModel:
-    """The arrangement with another drive, and the frame and shroud that it asks for."""
-    spec, parts, stage = arrangement.spec, arrangement.parts, arrangement.stage
-    keep_out, layout, base = arrangement.keep_out, arrangement.layout, arrangement.base
-    frame = frame_layout(spec.prototype, layout, base, stage, drive, keep_out, parts)
-    shroud = shroud_round(spec, stage, frame, keep_out, parts)
-    return replace(arrangement, drive=drive, frame=frame, shroud=shroud)
-
-
 def _placed(components: Sequence[Component], spec: Spec) -> list[PlacedSolid]:
-    return placed_components(components, spec.printer, spec.mesh.structure_error_mm)
+    mesh_mm = spec.mesh.structure_error_mm
+    return [placed_component(one, spec.printer, mesh_mm) for one in components]
 
 
 def parts_or_error(build: Callable[..., list[PlacedSolid]], *arguments: Any) -> PartsOrError:
@@ -157,16 +144,6 @@ def parts_of(outcome: FutureParts) -> list[PlacedSolid]:
     if isinstance(parts, Exception):
         raise parts
     return parts
-
-
-def _gauge(
-    spec: Spec, layout: PrototypeLayout, base: BaseLayout, frame: FrameLayout
-) -> CameraGauge | None:
-    if frame.mount is None:
-        return None
-    camera, diameter = layout.array.camera, spec.prototype.camera_diameter_mm
-    needed = camera_requirements(layout.array, spec.optics.capture_diameter_mm / 2)
-    return camera_gauge(base, camera, diameter, needed, layout.stops.range)
 
 
 def _carrier(base: BaseLayout, pieces: list[PlacedSolid]) -> Iterator[PrintedPart]:

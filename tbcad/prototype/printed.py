@@ -228,13 +228,6 @@ def placed_component(component: Component, printer: PrinterSpec, mesh_mm: float)
     return placed_on_bed(name, solid, mesh, properties(solid), downs, np.eye(3), printer)
 
 
-def placed_components(
-    components: Sequence[Component], printer: PrinterSpec, mesh_mm: float
-) -> list[PlacedSolid]:
-    """Several components, each as `placed_component` places it."""
-    return [placed_component(component, printer, mesh_mm) for component in components]
-
-
 def _outward(body: Prism) -> Floats:
     """The corners in the order that turns the prism's faces outward."""
     a, b = body.corners[1] - body.corners[0], body.corners[2] - body.corners[0]

@@ -149,6 +149,36 @@ class StopRow(TableRow):
     wind_up_deg: float = Field(ge=-MAX_WIND_UP_DEG, le=MAX_WIND_UP_DEG)
 
 
+class WiringRow(TableRow):
+    """A line of the controller.
+
+    Attributes:
+        on: command that switches it on; off too.
+        pins: of the connector.
+        resistor: in series, as in the list of parts.
+        path: of the wire, in words.
+    """
+
+    FILE: ClassVar[str] = "wiring.csv"
+    line: int
+    signal: str
+    part: str
+    output: str
+    on: Text
+    off: Text
+    connector: Text
+    pins: Text
+    supply_v: Number
+    forward_v: Number
+    resistor: Text
+    resistor_ohm: Number
+    current_ma: Number
+    dissipation_w: Number
+    wire: Text
+    length_mm: Number
+    path: Text
+
+
 class RayRow(TableRow):
     """How well a calibration knows the middle ray of a mirror: of its columns those that are read.
 

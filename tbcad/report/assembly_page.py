@@ -43,8 +43,8 @@ def write_page(
 def page(machine: AssembledMachine, steps: Sequence[Step], pictures: Mapping[str, bytes]) -> str:
     """The page as HTML; pictures: PNG files by keys of steps."""
     words = tomllib.loads((files("tbcad.report") / WORDS).read_text(encoding="utf-8"))
-    what = {int(row["item"] or 0): str(row["what"]) for row in machine.rows}
-    kinds = {machine.kind(part) for part in machine.items}
+    what = {int(row["item"] or 0): str(row["what"]) for row in machine.bill.rows}
+    kinds = {machine.kind(part) for part in machine.bill.items}
     tools = [tool for kind, tool in words["tools_of_kinds"].items() if kind in kinds]
     body = (
         "<h1>Assembly</h1>",

@@ -29,7 +29,7 @@ from tbcad.drawings.tables import (
 )
 from tbcad.output.manifest import read_manifest, write_manifest
 from tbcad.prototype.assembly_steps.machine import AssembledMachine
-from tbcad.prototype.files.bom import COLUMNS
+from tbcad.prototype.files.bom import COLUMNS, PartsList
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.design import DesignRecord
 from tbcad.records.prototype import CapRecord, Prototype
@@ -181,9 +181,8 @@ def export(folder: Path, carrier: Solid) -> DrawnExport:
         ],
     )
     row = {"item": 65, "part": "carrier", "quantity": 1, "material": "PETG"}
-    machine = AssembledMachine(
-        (dict.fromkeys(COLUMNS, None) | row,), Prototype.model_validate(record), (), {}, PARTS
-    )
+    bill = PartsList((dict.fromkeys(COLUMNS, None) | row,))
+    machine = AssembledMachine(bill, Prototype.model_validate(record), (), {}, PARTS)
     design = DesignRecord.model_construct(spec=load_spec(None, ["n=6"]))
     manifest = read_manifest(folder)
     assert manifest is not None

@@ -8,8 +8,9 @@ from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.frame.layout import FrameLayout, frame_layout
+from tbcad.prototype.frame.layout import frame_layout
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
+from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_layout
 
@@ -64,13 +65,21 @@ def stage(spec: PrototypeSpec, small_prototype: PrototypeLayout, keep_out: KeepO
 
 
 @pytest.fixture(scope="session")
-def frame(
-    spec: PrototypeSpec,
-    small_prototype: PrototypeLayout,
-    carrier: BaseLayout,
-    stage: StageLayout,
-    keep_out: KeepOut,
-) -> FrameLayout:
+def site(
+    small_prototype: PrototypeLayout, carrier: BaseLayout, stage: StageLayout, keep_out: KeepOut
+) -> Site:
     parts = load_parts()
-    drive = load_drives(parts)[0]
-    return frame_layout(spec, small_prototype, carrier, stage, drive, keep_out, parts)
+    return Site(
+        spec=SMALL,
+        layout=small_prototype,
+        base=carrier,
+        drive=load_drives(parts)[0],
+        keep_out=keep_out,
+        stage=stage,
+        parts=parts,
+    )
+
+
+@pytest.fixture(scope="session")
+def frame(site: Site) -> FrameLayout:
+    return frame_layout(site)

@@ -7,7 +7,6 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec, spec_dict
 from tbcad.core.spec.prototype import PAD_ANGLES_DEG, Hold
 from tbcad.prototype.arrangement import PrototypeModel, arrange, arrangements
-from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.base.solid import carrier_parts
 from tbcad.prototype.drive.balance import ball_masses
@@ -23,7 +22,7 @@ def magnets_hold(arrangement: PrototypeModel, pad_angle_deg: float) -> bool:
     changed = {"hold": "magnet", "pad_angle_deg": pad_angle_deg}
     section = arrangement.spec.prototype.base.model_copy(update=changed)
     try:
-        base_layout(section, arrangement.layout, base_motion(arrangement.spec))
+        base_layout(section, arrangement.layout)
     except SpecError:
         return False
     return True

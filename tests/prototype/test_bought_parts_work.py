@@ -19,11 +19,15 @@ from tbcad.core.spec.load import load_spec
 from tbcad.prototype.arrangement import PrototypeModel, arrange
 from tbcad.prototype.drive.balance import free_base_angles
 from tbcad.prototype.drive.drive import BaseTorques, drive_loads, load_drives
-from tbcad.prototype.electronics import wiring_layout, wiring_rows
+from tbcad.prototype.electronics import Wiring, led_circuit
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import bom_rows
 from tbcad.prototype.files.controllers import controller_files
 from tbcad.prototype.files.tables import hole_rows
+from tbcad.prototype.frame.shared import BearingHead
+from tbcad.prototype.frame.stock import Stock
+from tbcad.prototype.homing import HomingLayout
+from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.purchased.parts import Prices, load_parts
 
 DESIGNS = (
@@ -52,14 +56,13 @@ def model(request: pytest.FixtureRequest) -> PrototypeModel:
 
 
 def bought(model: PrototypeModel) -> Counter[str]:
-    parts = model.parts | model.wiring.parts
+    parts = model.parts | model.frame.of(Wiring).parts
     rows = bom_rows(model.layout, model.drive, model.purchased, (), 1.27, parts, Prices(()))
     return Counter({str(row["part"]): int(row["quantity"]) for row in rows})
 
 
 def wiring(model: PrototypeModel) -> dict[str, Row]:
-    rows = wiring_rows(model.wiring, model.frame.lamps, model.drive)
-    return {str(row["signal"]): row for row in rows}
+    return {str(row["signal"]): row for row in model.frame.of(Wiring).rows}
 
 
 def along(model: PrototypeModel, points: np.ndarray) -> np.ndarray:
@@ -83,7 +86,7 @@ def holes(model: PrototypeModel, removed: tuple[Primitive, ...], diameter: float
 def test_each_body_and_each_line_of_the_wiring_is_bought(model: PrototypeModel) -> None:
     frame, list_ = model.frame, bought(model)
     drawn = Counter(one.part for one in frame.purchased if one.part)
-    lamps = frame.lamps
+    lamps = frame.find(LampLayout)
     if lamps:
         del drawn[lamps.strip.name]
         metres = len(lamps.places) * lamps.strips * lamps.length / 1e3
@@ -94,8 +97,8 @@ def test_each_body_and_each_line_of_the_wiring_is_bought(model: PrototypeModel) 
     begins = Counter(name.partition("-")[0] for name in drawn.elements())
     assert begins["LED"] == len(model.stage.leds)
     assert (begins["MAGNET"] > 0) == (model.spec.prototype.base.hold == "magnet")
-    assert drawn[frame.upright.name] == 2
-    assert list_[frame.homing.pin] == 1
+    assert drawn[frame.of(Stock).upright.name] == 2
+    assert list_[frame.of(HomingLayout).pin] == 1
     if model.shroud:
         panels = sum(math.prod(panel.cut_size) for panel in model.shroud.panels)
         sheet = model.shroud.sheet["length_mm"] * model.shroud.sheet["width_mm"]
@@ -107,7 +110,7 @@ def test_each_body_and_each_line_of_the_wiring_is_bought(model: PrototypeModel) 
 
 
 def test_wiring_of_lamps_release_switch_and_motor(model: PrototypeModel) -> None:
-    rows, lamps, motor = wiring(model), model.frame.lamps, model.drive.motor
+    rows, lamps, motor = wiring(model), model.frame.find(LampLayout), model.drive.motor
     if "release" in rows:  # spindle and coolant of GRBL: M8 on, M9 off
         assert (rows["release"]["on"], rows["release"]["off"]) == ("M8", "M9")
     amperes = motor["rated_a"] if motor.kind == "motors" else None
@@ -120,11 +123,11 @@ def test_wiring_of_lamps_release_switch_and_motor(model: PrototypeModel) -> None
         apart = norm(np.diff(lamps.places, axis=0)).max()
         reach = 1000 + len(lamps.places[1:]) * apart
         assert float(rows["lamp"]["length_mm"]) >= reach
-    if model.wiring.wire:
-        weak = {model.wiring.wire.name: replace(model.wiring.wire, sizes=(0.5, 5.0))}
+    if circuit := model.frame.of(Wiring).circuit:
+        weak = {circuit.wire.name: replace(circuit.wire, sizes=(0.5, 5.0))}
         thick = {name: part for name, part in model.parts.items() if not name.startswith("WIRE-")}
         with pytest.raises(SpecError, match="wires of LEDs"):
-            wiring_layout(model.spec.prototype, model.stage, thick | weak)
+            led_circuit(model.spec.prototype, model.stage, thick | weak)
 
 
 def test_screws_reach_into_their_threads(model: PrototypeModel) -> None:
@@ -141,7 +144,7 @@ def test_screws_reach_into_their_threads(model: PrototypeModel) -> None:
         if last == "plate":
             floor = model.spec.prototype.frame.floor_mm
             depth = floor - float((one.place + length * one.along)[2])
-            assert thread <= depth <= model.frame.plate["thickness_mm"], one.name
+            assert thread <= depth <= model.frame.of(Stock).plate["thickness_mm"], one.name
         elif mates:
             assert max(engaged(each, one) for each in mates) >= 0.6 * thread, one.name
     motor = np.array([one.place for one in some if one.through[-1] == "motor"])
@@ -168,18 +171,19 @@ def engaged(mate: Fastener, screw: Fastener) -> float:
 
 
 def test_holes_of_the_plate_are_where_screws_are(model: PrototypeModel) -> None:
-    frame = model.frame
-    told = np.array([[float(row["x_mm"]), float(row["y_mm"])] for row in hole_rows(frame)])
+    stock = model.frame.of(Stock)
+    told = np.array([[float(row["x_mm"]), float(row["y_mm"])] for row in hole_rows(stock)])
     screws = [one.place for one in model.fasteners if one.through[-1] == "plate"]
-    places = (np.array(screws) @ frame.axes.T)[:, :2] - frame.corner
+    places = (np.array(screws) @ model.axes.T)[:, :2] - stock.corner
     assert np.sort(norm(told[:, None] - places), axis=1)[:, 0] == pytest.approx(0, abs=1e-6)
-    assert ((told > 5) & (told < np.array(frame.plate.sizes[:2]) - 5)).all()
+    assert ((told > 5) & (told < np.array(stock.plate.sizes[:2]) - 5)).all()
 
 
 def test_the_tab_presses_the_switch_at_its_angle_alone(model: PrototypeModel) -> None:
     """Below the switch's angle the roller is where it trips; from the first stop up it is free."""
-    homing = model.frame.homing
-    drilled = [one.start for one in homing.switch.removed if isinstance(one, Cylinder)]
+    homing = model.frame.of(HomingLayout)
+    (switch,) = homing.purchased
+    drilled = [one.start for one in switch.removed if isinstance(one, Cylinder)]
     middle = along(model, np.mean(drilled, axis=0))[1:]
     outlines = [
         along(model, enclosing_triangles(one).reshape(-1, 3))[:, 1:] for one in homing.disc.added
@@ -206,21 +210,22 @@ def edge(points: np.ndarray, way: np.ndarray) -> float:
 
 
 def test_the_zero_pin_goes_through_head_and_disc(model: PrototypeModel) -> None:
-    frame, hub = model.frame, model.base.hub
-    disc = holes(model, frame.homing.disc.removed, PIN_HOLE_MM)
-    head = holes(model, frame.head.component.removed, PIN_HOLE_MM)
+    homing, on_head = model.frame.of(HomingLayout), model.frame.of(BearingHead)
+    hub = model.base.hub
+    disc = holes(model, homing.disc.removed, PIN_HOLE_MM)
+    head = holes(model, on_head.printed[0].removed, PIN_HOLE_MM)
     assert head == pytest.approx(disc)
     assert len(disc) == 1
-    pin = model.parts[frame.homing.pin]
+    pin = model.parts[homing.pin]
     assert pin["diameter_mm"] == PIN_MM
-    assert pin["length_mm"] >= hub.face - frame.head.plate.back + 5  # that one can grip
+    assert pin["length_mm"] >= hub.face - on_head.plate.back + 5  # that one can grip
     key = float(norm(hub.key))
     play = (PIN_HOLE_MM - PIN_MM) / float(norm(disc[0])) + 0.1 / key
-    assert frame.homing.error_deg == pytest.approx(math.degrees(play))
+    assert homing.error_deg == pytest.approx(math.degrees(play))
 
 
 def test_both_controllers_are_told_the_same_machine(model: PrototypeModel) -> None:
-    motion, angles = model.spec.prototype.motion, model.frame.homing.angles
+    motion, angles = model.spec.prototype.motion, model.frame.of(HomingLayout).angles
     files = controller_files(model.layout, model.drive, motion, len(model.stage.leds), "a design")
     grbl = {
         int(number): float(value)

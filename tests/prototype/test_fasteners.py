@@ -5,13 +5,7 @@ import pytest
 
 from tbcad.cad.kernel.checks import volume as solid_volume
 from tbcad.core.geometry.primitives import enclosing_triangles, volume
-from tbcad.prototype.fasteners import (
-    PROFILES,
-    Fastener,
-    core_radius,
-    fastener_component,
-    numbered,
-)
+from tbcad.prototype.fasteners import PROFILES, Fastener, core_radius, fastener_component, numbered
 from tbcad.prototype.printed import component_solid
 from tbcad.prototype.purchased.parts import load_parts, of_kind
 

@@ -1,14 +1,15 @@
 """Zero disc and switch: solids, the angles of homing, and what has no room."""
 
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
 
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import MotionSpec
+from tbcad.prototype import homing as laid_out
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.balance import (
     MIN_BELOW_DEG,
     HomeAngles,
@@ -16,8 +17,8 @@ from tbcad.prototype.drive.balance import (
     home_angles,
     stop_sequence,
 )
-from tbcad.prototype.frame.layout import FrameLayout
-from tbcad.prototype.homing import homing_layout
+from tbcad.prototype.homing import HomingLayout
+from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.printed import component_solid
 from tbcad.prototype.purchased.parts import load_parts
 
@@ -43,10 +44,14 @@ def test_no_room_below_the_first_stop(small_prototype: PrototypeLayout) -> None:
 
 
 def test_the_parts_are_solids_and_a_swing_may_leave_no_room_for_the_tab(
-    frame: FrameLayout, carrier: BaseLayout
+    site: Site, frame: FrameLayout
 ) -> None:
-    for component in (frame.homing.disc, frame.homing.bracket, frame.homing.switch):
+    homing = frame.of(HomingLayout)
+    for component in (homing.disc, *homing.printed, *homing.purchased):
         assert component_solid(component)
     whole = HomeAngles(-170.0, -168.0, 345.0)
-    with pytest.raises(SpecError, match="no room for the tab"):
-        homing_layout(carrier, frame.head.plate, whole, PARTS)
+    with (
+        mock.patch.object(laid_out, "home_angles", return_value=whole),
+        pytest.raises(SpecError, match="no room for the tab"),
+    ):
+        laid_out.homing_layout(site, frame)

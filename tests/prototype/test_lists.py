@@ -13,13 +13,9 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.electronics import (
-    e24_at_least,
-    series_resistor,
-    wiring_layout,
-    wiring_rows,
-)
+from tbcad.prototype.electronics import e24_at_least, led_circuit, series_resistor, wiring_layout
 from tbcad.prototype.files.bom import ALWAYS, PrintedItem, bom_rows, totals
+from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.purchased.parts import Prices, load_parts, load_prices
 from tbcad.prototype.stage.layout import StageLayout
 
@@ -49,27 +45,23 @@ LIGHT = st.fixed_dictionaries({"led_ma": st.floats(1, 20), "led_supply_v": st.fl
 @settings(SHARED, max_examples=30)
 @given(leds=st.integers(0, 6), motion=MOTION, light=LIGHT, drive=st.sampled_from(DRIVES))
 def test_every_line_of_the_wiring(
-    spec: PrototypeSpec,
-    stage: StageLayout,
-    leds: int,
-    motion: dict[str, str],
-    light: dict[str, float],
-    drive: Drive,
+    site: Site, leds: int, motion: dict[str, str], light: dict[str, float], drive: Drive
 ) -> None:
-    chosen = spec.model_copy(
-        update={
-            "motion": spec.motion.model_copy(update=motion),
-            "stage": spec.stage.model_copy(update=light),
-        }
-    )
+    spec, stage = site.spec.prototype, site.stage
+    changes = {
+        "motion": spec.motion.model_copy(update=motion),
+        "stage": spec.stage.model_copy(update=light),
+    }
+    chosen = site.spec.model_copy(update={"prototype": spec.model_copy(update=changes)})
     hand, axis = motion["controller"] == "grbl", motion["axis"]
     milliampere, volt = light["led_ma"], light["led_supply_v"]
     places = np.column_stack([np.linspace(3, 25, leds), np.zeros(leds), np.full(leds, -5.0)])
     try:
-        wiring = wiring_layout(chosen, replace(stage, leds=places), PARTS)
+        lit = replace(site, spec=chosen, drive=drive, stage=replace(stage, leds=places))
+        wiring = wiring_layout(lit, FrameLayout(()))
     except SpecError:  # no resistor is rated for it, or the wires have no room
         return
-    rows = wiring_rows(wiring, None, drive)
+    rows = wiring.rows
     of = {row["signal"]: row for row in rows}
     switched = ["lamp", *(f"led_{k + 1}" for k in range(leds))]
     released = ["release"] if motion["trigger"] == "coolant" else []
@@ -95,7 +87,7 @@ def test_every_line_of_the_wiring(
     assert of["home"]["output"] == f"limit {axis}"
     assert (of["motor"]["output"], of["motor"]["part"]) == (f"driver {axis}", drive.motor.name)
     assert (of["supply"]["connector"], of["supply"]["supply_v"]) == ("FUSE-2A", 24.0)
-    bought = wiring.purchased(None)
+    bought = wiring.listed
     assert bought.get("MOSFET", 0) == (0 if hand else leds + 1)
     metres = Counter[str]()
     for row in rows:
@@ -120,7 +112,7 @@ def test_circuits_that_there_are_not(spec: PrototypeSpec, stage: StageLayout) ->
         series_resistor(led, 10.0, 24.0, none)
     narrow = replace(stage, sizes=replace(stage.sizes, wire=0.9))
     with pytest.raises(SpecError, match=r"8 wires of LEDs do not fit .* bore of 1\.8 mm"):
-        wiring_layout(spec, narrow, PARTS)
+        led_circuit(spec, narrow, PARTS)
 
 
 def test_the_supply_bears_motor_and_lights() -> None:

@@ -9,12 +9,13 @@ import pytest
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.purchased.parts import (
     COMMON_COLUMNS,
+    KINDS,
     PRICE_FIELDS,
-    SIZES,
     load_parts,
     load_prices,
     of_kind,
     package_lists,
+    sizes_of,
 )
 
 PARTS = load_parts()
@@ -37,16 +38,12 @@ def test_parts_have_the_sizes_of_their_standards() -> None:
         sizes = ("hole_square_mm", "thread_mm", "pilot_mm", "shaft_mm")
         assert [PARTS[name][size] for size in sizes] == [31, 3, 22, 5]
     assert [PARTS["608-2Z"][size] for size in ("bore_mm", "outer_mm", "width_mm")] == [8, 22, 7]
-    assert {part.kind for part in PARTS.values()} == set(SIZES)
+    assert {part.kind for part in PARTS.values()} == set(KINDS)
 
 
 @pytest.mark.parametrize(
     ("kind", "density", "size"),
-    [
-        ("magnets", 7.5, "height_mm"),
-        ("dowels", 7.85, "length_mm"),
-        ("shafts", 7.85, "length_mm"),
-    ],
+    [("magnets", 7.5, "height_mm"), ("dowels", 7.85, "length_mm"), ("shafts", 7.85, "length_mm")],
 )
 def test_masses_of_rods(kind: str, density: float, size: str) -> None:
     for part in of_kind(PARTS, kind):
@@ -73,7 +70,7 @@ def test_longer_screws_are_heavier() -> None:
 )
 def test_wrong_cells_are_named(tmp_path: Path, row: str, message: str) -> None:
     path = package_copy(tmp_path) / "magnets.csv"
-    header = ",".join([*COMMON_COLUMNS, *SIZES["magnets"], "source"])
+    header = ",".join([*COMMON_COLUMNS, *sizes_of("magnets"), "source"])
     path.write_text(f"{header}\nOK,w,m,1,3,3,s\n{row}\n")
     with pytest.raises(SpecError) as caught:
         load_parts(tmp_path)

@@ -13,6 +13,7 @@ from tbcad.core.geometry.rotations import even_angles, unit_circle
 from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.types import Floats
 
+IDENTITY = np.eye(3)
 SIDES = 32  # of circumscribed polygons that clearances of round primitives are measured on
 
 
@@ -79,7 +80,9 @@ def rectangle(low: Sequence[float] | Floats, high: Sequence[float] | Floats) -> 
     return np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
 
 
-def box(low: Floats, high: Floats, axes: Floats) -> Prism:
+def box(
+    low: Sequence[float] | Floats, high: Sequence[float] | Floats, axes: Floats = IDENTITY
+) -> Prism:
     """The box between two points (3,) whose coordinates are along the rows of axes (3, 3)."""
     corners = np.column_stack([rectangle(low, high), np.full(4, low[2])])
     return Prism(corners @ axes, (high[2] - low[2]) * axes[2])

@@ -7,16 +7,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
-from tbcad.cad.formats.checked_files import Row
-from tbcad.core.spec.csv_rows import read_rows
-from tbcad.errors import InputError
-from tbcad.prototype import electronics
-from tbcad.prototype.files.bom import read_parts_list
+from tbcad.prototype.files.bom import PartsList, read_parts_list
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, load_parts
 from tbcad.records.prototype import NAME, FastenerRecord, Prototype
-from tbcad.records.tables import BallRow
+from tbcad.records.tables import BallRow, WiringRow
 
-WIRING = "wiring.csv"
 UNIT_PARTS = ("strips", "sheets")  # kinds that are counted by the metre or sheet, not by bodies
 RESISTORS, OWN = "resistors", "own"
 
@@ -25,22 +20,12 @@ RESISTORS, OWN = "resistors", "own"
 class AssembledMachine:
     """What a prototype consists of."""
 
-    rows: tuple[Row, ...]  # of its list of parts
+    bill: PartsList  # its list of parts
     record: Prototype  # prototype.json
-    wiring: tuple[dict[str, str], ...]  # lines of wiring.csv
+    wiring: tuple[WiringRow, ...]  # lines of the controller
     # diameter text of each purchased ball by its number, as in the list of parts
     sizes: dict[int, str]
     parts: Parts  # tbcad's lists of purchased parts
-
-    @cached_property
-    def items(self) -> dict[str, int]:
-        """Number in the list of each part."""
-        return {str(row["part"]): int(row["item"] or 0) for row in self.rows}
-
-    @cached_property
-    def quantities(self) -> dict[str, int]:
-        """Quantity of each part."""
-        return {str(row["part"]): int(row["quantity"] or 0) for row in self.rows}
 
     @cached_property
     def bodies(self) -> dict[str, str]:
@@ -71,7 +56,7 @@ class AssembledMachine:
 
     def kind(self, part: str) -> str:
         """The list that a part is in, such as screws; own where it is in none."""
-        if any(row["resistor"] == part for row in self.wiring):
+        if any(row.resistor == part for row in self.wiring):
             return RESISTORS
         found = self.parts.get(part)
         return found.kind if found else OWN
@@ -82,7 +67,7 @@ class AssembledMachine:
 
     def ref(self, part: str) -> str:
         """A part with its number in the list, for a text."""
-        return f"{part} ({self.items[part]})" if part in self.items else part
+        return f"{part} ({self.bill.items[part]})" if part in self.bill.items else part
 
     def body_ref(self, body: str) -> str:
         """A body's part with its number in the list."""
@@ -94,13 +79,10 @@ def read_machine(folder: Path) -> AssembledMachine:
 
     InputError: a file is missing or broken, or was written by an earlier version.
     """
-    rows = read_parts_list(folder).rows
-    record = Prototype.read(folder / NAME)
-    if not (wiring := folder / WIRING).is_file():
-        raise InputError(f"{wiring} is not there: name a folder with a prototype by tbcad build")
-    lines = [row for _, row in read_rows(wiring, WIRING, electronics.COLUMNS)]
+    bill, record = read_parts_list(folder), Prototype.read(folder / NAME)
+    wiring = tuple(WiringRow.read(folder))
     sizes = {ball.number: ball.size for ball in BallRow.read(folder) if ball.kind == "ball"}
-    return AssembledMachine(rows, record, tuple(lines), sizes, load_parts())
+    return AssembledMachine(bill, record, wiring, sizes, load_parts())
 
 
 Words: TypeAlias = tuple[list[str], ...]
@@ -112,7 +94,7 @@ class StepPlan:
     """A step as it is planned for all designs."""
 
     title: str  # of the step
-    words: Callable[[AssembledMachine], Words]  # for a prototype; it has the step's name for files
+    words: Callable[[AssembledMachine], Words]  # for a prototype; named by the step
     bodies: tuple[str, ...]  # patterns of names of the bodies that it mounts
     loose: tuple[str, ...]  # parts, or kinds of them, without bodies that it takes
     near: tuple[str, ...]  # bodies that the picture shows, too
@@ -120,7 +102,7 @@ class StepPlan:
     @property
     def key(self) -> str:
         """Name of the step for files."""
-        return self.words.__name__
+        return self.words.__name__.removesuffix("_step")
 
     def needed(self, machine: AssembledMachine) -> bool:
         """Whether a prototype has any of its bodies; a step of none is always needed."""

@@ -20,18 +20,13 @@ import numpy as np
 
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
-from tbcad.prototype.assembly_steps import mechanics, start
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, StepPlan
 from tbcad.prototype.fasteners import core_radius
 from tbcad.prototype.purchased.parts import PurchasedPart
+from tbcad.prototype.registry import PARTS
 from tbcad.records.prototype import AssemblyStep, FastenerRecord
 
-PLANS = (
-    *(mechanics.coupon, mechanics.shop, mechanics.carrier, mechanics.caps, mechanics.frame),
-    *(mechanics.head, mechanics.table, mechanics.hub, mechanics.shaft, mechanics.motor),
-    *(mechanics.homing, start.lamps, start.stage, start.camera, start.wiring, start.zero),
-    *(start.gauge, start.balls, start.shroud, start.first),
-)
+PLANS = tuple(step for part in PARTS for step in part.steps)
 NUT_FACTOR = 0.2
 PRESSURE_MPA, SHEAR_MPA, PROOF_MPA, PROOF_SHARE = 20.0, 8.0, 580.0, 0.75
 HOLE_PLAY_MM = 0.5  # of a hole beyond its screw
@@ -160,7 +155,7 @@ def _loose(
     """By step, how many of each part that no body is of."""
     drawn = Counter(part for part in parts.values() if machine.by_body(part))
     taken: dict[str, Counter[str]] = {plan.key: Counter() for plan in plans}
-    for part, quantity in machine.quantities.items():
+    for part, quantity in machine.bill.quantities.items():
         rest = quantity - drawn[part]
         if rest < 0:
             raise InputError(
@@ -180,10 +175,10 @@ def _uses(machine: AssembledMachine, parts: dict[str, str], loose: Counter[str])
         here.setdefault(part, []).append(body)
     uses = []
     for part, bodies in here.items():
-        if part not in machine.items:
+        if part not in machine.bill.items:
             raise InputError(f"{part} is mounted but not in the list of parts: build again")
         drawn = len(bodies) if machine.by_body(part) else 0
-        uses.append(Use(machine.items[part], part, drawn + loose[part], tuple(bodies)))
+        uses.append(Use(machine.bill.items[part], part, drawn + loose[part], tuple(bodies)))
     return tuple(sorted(uses, key=lambda use: use.item))
 
 

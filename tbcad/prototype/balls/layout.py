@@ -218,10 +218,7 @@ class BallChoices:
 
 
 def prototype_layout(
-    spec: Spec,
-    design: MirrorDesign,
-    count: int | None = None,
-    choices: BallChoices | None = None,
+    spec: Spec, design: MirrorDesign, count: int | None = None, choices: BallChoices | None = None
 ) -> PrototypeLayout:
     """Group the mirrors, choose the balls, place them, and plan the stops.
 

@@ -130,11 +130,7 @@ def azimuths_for_fewer_stops(
 
 
 def _free_azimuths(
-    problem: PlacementProblem,
-    azimuth: Floats,
-    ball: int,
-    step: float,
-    limits: tuple[float, float],
+    problem: PlacementProblem, azimuth: Floats, ball: int, step: float, limits: tuple[float, float]
 ) -> Floats:
     """Azimuths that a ball may have while the others stay, its present one first."""
     half_swing, outermost = limits

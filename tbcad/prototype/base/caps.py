@@ -9,11 +9,16 @@ and coverage, which is twice its distance from the origin, by 4 L a. The margin 
 shared equally (root sum of squares) by radius, figure, tilt and seat.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from tbcad.cad.drafting.sheet import A4, Sheet, TitleBlock, choose_scale, sheet_frame
+from tbcad.cad.formats.entities import Arc, Entity, Layer, Line, Point, Polyline, Text
 from tbcad.core.geometry.vectors import norm
-from tbcad.core.optics.reflection import roughness_nm
+from tbcad.core.optics.reflection import roughness_nm, scattered_share
 from tbcad.core.spec.design import Spec
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import magnet_part, seat_magnets
 from tbcad.prototype.base.holding import (
@@ -22,7 +27,7 @@ from tbcad.prototype.base.holding import (
     MIN_RATIO,
     REMANENCE_T,
     WIDER_GAP_MM,
-    Motion,
+    base_motion,
     force_needed,
     glue_force,
     pull_of_pair,
@@ -31,6 +36,7 @@ from tbcad.prototype.base.holding import (
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.balance import ball_masses
 from tbcad.prototype.fasteners import Fastener
+from tbcad.prototype.part import Part
 from tbcad.prototype.purchased.parts import Parts
 from tbcad.records.prototype import CapRecord, HeldBall, Holding
 
@@ -44,6 +50,14 @@ FRINGE_MM = 546.07e-6 / 2  # ISO 10110-5: half a wavelength of the green mercury
 MIN_REFLECTANCE = 0.55  # of polished steel, as the balls: without what roughness scatters
 MATERIAL = "resin"
 FINISH = "polished and coated with aluminium as its drawing asks"
+# Of the optical drawing, on paper.
+VIEW_MM = 95.0, 95.0  # room of the section on paper
+MIDDLE_MM = 80.0, 128.0  # of the body's centre on paper
+TABLE_X_MM, TOP_MM, LINE_MM = 155.0, 190.0, 5.5  # of the table's texts
+HEAD_MM, TEXT_MM = 3.5, 2.8
+BEYOND_MM, APART_MM = 3.0, 5.0  # of centre lines beyond the section; of texts from them
+EDGE_DEG = 45.0  # where front and body meet, on the body
+G_PER_KG = 1000.0
 POLARITY = "north pole toward the object, as all magnets of the seats"
 
 
@@ -142,9 +156,10 @@ def _limits(spec: Spec, base: BaseLayout, prototype: PrototypeLayout, k: int) ->
     )
 
 
-def holding(base: BaseLayout, prototype: PrototypeLayout, motion: Motion, parts: Parts) -> Holding:
+def holding(base: BaseLayout, prototype: PrototypeLayout, parts: Parts) -> Holding:
     """What holds each ball in its seat, with the pads as they are turned, and assumptions."""
-    seats, masses = base.seats, ball_masses(prototype, motion.cap_density)
+    seats, motion = base.seats, base_motion(prototype.spec)
+    masses = ball_masses(prototype, motion.cap_density)
     needed = force_needed(
         seats.pad_normals, seats.axis, seats.centre, masses.mass_g, base.frame, motion
     ).tolist()
@@ -186,3 +201,166 @@ def _forces(base: BaseLayout, prototype: PrototypeLayout, k: int) -> tuple[float
         drawn, wider = (pull_of_pair(own, magnet, between + more, heights) for more in gaps)
         return drawn, wider
     return float(glue_force(seats.pocket[k])), None
+
+
+@planned("Make the caps", "cap_*")
+def caps_step(machine: AssembledMachine) -> Words:
+    """Mirrors that are printed or turned."""
+    caps = machine.record.caps
+    drawings = ", ".join(str(one.pdf) for one in caps)
+    does = [
+        "Print the caps front up in resin, or have them turned; polish and coat them as "
+        f"{drawings} ask{'s' if len(caps) == 1 else ''}.",
+        "Glue a magnet into each spigot, its north pole toward the front, so that the seat's "
+        "magnet attracts it.",
+        "Fit the spigot into the pocket of its seat.",
+    ]
+    checks = [
+        f"Cap {one.ball}: the spigot of {one.spigot_mm:.1f} mm slides into seat {one.ball} and "
+        f"tilts by at most {one.tilt_deg:.1f} degrees."
+        for one in caps
+    ]
+    return does, checks
+
+
+@planned("Balls into their seats", "ball_*", near=("carrier",))
+def balls_step(machine: AssembledMachine) -> Words:
+    """Balls in their seats, by what holds them."""
+    held = [one for one in machine.record.holding.balls if one.ball in machine.sizes]
+    magnets = [one for one in held if one.by == "magnet"]
+    strongest = max(magnets, default=None, key=lambda one: one.force_available_n)
+    mass = machine.record.drive.mass_g / G_PER_KG
+    does = [
+        "Clean the balls with alcohol. Touch them only with gloves from now on.",
+        when(machine.record.caps, "Push the caps into their seats, too."),
+        "Put each into the seat with its number on the back, in any order. balls.csv lists the "
+        "balls by number."
+        if strongest
+        else "Put a small drop of glue into the well of each seat, none on the pads, and the ball "
+        "on it.",
+        f"The magnet of ball {strongest.ball} pulls with {strongest.force_available_n:.0f} N: let "
+        "the ball down by hand, and keep fingers off the edge of the cup."
+        if strongest
+        else "",
+    ]
+    named = ((one.ball, machine.ref(f"ball {machine.sizes[one.ball]}")) for one in held)
+    checks = [
+        *(f"{name.capitalize()} in seat {number}." for number, name in named),
+        "Each touches its three pads and does not rock. It stays in its seat when the base is "
+        f"turned through its whole travel; the base weighs {mass:.1f} kg now.",
+    ]
+    return does, checks
+
+
+def cap_sheet(design: str, base: BaseLayout, prototype: PrototypeLayout, one: CapRecord) -> Sheet:
+    """The optical drawing of a cap by its limits; the design is for the title block."""
+    k = one.ball - 1
+    body = 2 * float(prototype.balls.body_radius[k])
+    scale = choose_scale((body, _thickness(prototype, one)), VIEW_MM)
+    name = f"cap {one.ball}"
+    block = TitleBlock(
+        title=f"Optical drawing of {name} (ISO 10110)",
+        design=design,
+        item=name,
+        quantity=1,
+        material=one.material,
+        view="section through the axis",
+    )
+    entities = [
+        *sheet_frame(A4, scale, block),
+        *_section(base, prototype, one, scale),
+        *_table(one, float(prototype.balls.radius[k]), body),
+    ]
+    file = one.pdf.removesuffix(".pdf")
+    return Sheet(file, block.title, name, A4, scale, MIDDLE_MM, tuple(entities))
+
+
+def _thickness(prototype: PrototypeLayout, one: CapRecord) -> float:
+    """From the apex to the end of the spigot, mm."""
+    return float(prototype.balls.body_depth[one.ball - 1]) + one.spigot_end_mm
+
+
+def _section(
+    base: BaseLayout, prototype: PrototypeLayout, one: CapRecord, scale: float
+) -> Iterator[Entity]:
+    """The section, its front up, its axis, and the diameter in use."""
+    (x, y), k, balls = MIDDLE_MM, one.ball - 1, prototype.balls
+    body, radius = float(balls.body_radius[k]), float(balls.radius[k])
+    depth, flat = float(balls.body_depth[k]), flat_depth(base, k)
+
+    def at(across: float, behind: float) -> Point:
+        return x + scale * across, y - scale * behind
+
+    whole = radius <= body  # a ball to its apex
+    if not whole:
+        front = float(np.degrees(np.arcsin(cap_edge(prototype, k) / radius)))
+        middle = at(0.0, radius - depth)
+        yield Arc(Layer.CUT, middle, scale * radius, 90.0 - front, 90.0 + front)
+    low = -float(np.degrees(np.arcsin(flat / body)))
+    high = 90.0 if whole else EDGE_DEG
+    yield Arc(Layer.CUT, at(0.0, 0.0), scale * body, low, high)
+    yield Arc(Layer.CUT, at(0.0, 0.0), scale * body, 180.0 - high, 180.0 - low)
+    yield Polyline(Layer.CUT, tuple(at(*corner) for corner in _back(base, k, depth)), closed=False)
+    below = one.spigot_end_mm + BEYOND_MM / scale
+    yield Line(Layer.CENTRE, at(0.0, -depth - BEYOND_MM / scale), at(0.0, below))
+    for side in (1, -1):
+        rim = at(side * one.aperture_mm / 2, -depth)
+        yield Line(Layer.DIMENSIONS, rim, (rim[0], rim[1] + BEYOND_MM))
+    _, top = at(0.0, -depth)
+    used = f"effective diameter {one.aperture_mm:.1f}"
+    yield Text(Layer.DIMENSIONS, (x, top + APART_MM), TEXT_MM, used, "centre")
+    _, bottom = at(0.0, below)
+    length = f"length over all {_thickness(prototype, one):.2f}"
+    yield Text(Layer.DIMENSIONS, (x, bottom - APART_MM), TEXT_MM, length, "centre")
+
+
+def _back(base: BaseLayout, k: int, depth: float) -> list[Point]:
+    """Flat, spigot and pocket from one side to the other, across and behind the body's centre."""
+    flat, (spigot, end) = flat_depth(base, k), cap_spigot(base, k)
+    pocket, deep = cap_pocket(base, k, depth)
+    rim = float(np.sqrt(base.seats.radius[k] ** 2 - flat**2))
+    half = [(rim, flat), (spigot, flat), (spigot, end)]
+    if pocket:
+        half += [(pocket, end), (pocket, end - deep)]
+    return [*half, *((-across, behind) for across, behind in reversed(half))]
+
+
+def _table(one: CapRecord, radius: float, body: float) -> Iterator[Entity]:
+    """Texts beside the section, a head and lines for front, material and body."""
+    y = TOP_MM
+    for head, *texts in _blocks(one, radius, body):
+        yield Text(Layer.DIMENSIONS, (TABLE_X_MM, y), HEAD_MM, head)
+        for text in texts:
+            y -= LINE_MM
+            yield Text(Layer.DIMENSIONS, (TABLE_X_MM, y), TEXT_MM, text)
+        y -= 2 * LINE_MM
+
+
+def _blocks(one: CapRecord, radius: float, diameter: float) -> tuple[tuple[str, ...], ...]:
+    finish, scattered = one.roughness_rq_nm, scattered_share(one.roughness_rq_nm)
+    front = (
+        "Front",
+        f"R {radius:.1f} +-{one.radius_tolerance_mm:.2f} CX",
+        f"effective diameter {one.aperture_mm:.1f}",
+        f"3/ -({one.irregularity_fringes:.1f}), fringes of 546 nm over it",
+        f"4/ centre of R within {one.centre_shift_mm:.2f} of the spigot's axis",
+        f"Rq {finish:.1f} nm or better: scatters {scattered:.0%} at 550 nm",
+        f"coat: reflects {one.reflectance_min:.0%} or more unscattered, 400 to 700 nm at "
+        f"{one.incidence_deg:.0f} degrees",
+    )
+    material = (
+        "Material",
+        "SLA resin, lacquered before it is coated with aluminium,",
+        "or aluminium EN AW-6082, turned and polished",
+        "magnet in the spigot: north pole toward the front",
+    )
+    body = (
+        "Body and spigot",
+        f"sphere {diameter:.3f} +-{one.body_tolerance_mm:.2f}, lies on three pads: no coat there",
+        f"spigot {one.spigot_mm:.2f} in a pocket of {one.socket_mm:.2f}: fit it,",
+        f"play lets the cap tilt by {one.tilt_deg:.2f} degrees at most",
+    )
+    return front, material, body
+
+
+CAPS, BALLS = Part((caps_step,)), Part((balls_step,))

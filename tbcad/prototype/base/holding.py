@@ -105,10 +105,6 @@ class Motion:
     cap_density: float  # g/cm^3
 
 
-AT_DEFAULT_SPEED = Motion(np.radians(15.0), np.radians(50.0), 1.27)
-"""The motion of the defaults."""
-
-
 def base_motion(spec: Spec) -> Motion:
     """The motion that a design asks for."""
     motion = spec.prototype.motion
@@ -196,10 +192,9 @@ def magnet_pockets(
     return diameter, height, (diameter + spec.magnet_play_mm) / 2
 
 
-def worst_force_needed(
-    prototype: PrototypeLayout, axes: Floats, tilt: float, motion: Motion
-) -> Floats:
+def worst_force_needed(prototype: PrototypeLayout, axes: Floats, tilt: float) -> Floats:
     """Force that each ball needs with its pads at their worst azimuth, N, (k,)."""
+    motion = base_motion(prototype.spec)
     masses = ball_masses(prototype, motion.cap_density)
     turned = [np.full(len(masses), one) for one in PAD_AZIMUTHS.tolist()]
     normals = np.stack([pad_normals(tilt, azimuth) @ axes for azimuth in turned])

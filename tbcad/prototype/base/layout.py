@@ -10,16 +10,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tbcad.core.geometry.primitives import Cylinder, cylinder_between
 from tbcad.core.geometry.rotations import even_angles, unit_circle
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.optics.ball_light import light_hulls
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.base.holding import AT_DEFAULT_SPEED, Motion
 from tbcad.prototype.base.hub import Hub, deepened, hub_layout
 from tbcad.prototype.base.profile import (
     LightSpheroid,
+    at_azimuths,
     distance_outside,
     hull,
     offset,
@@ -29,6 +30,7 @@ from tbcad.prototype.base.profile import (
     trimmed,
 )
 from tbcad.prototype.base.seats import Seats, seat_layout
+from tbcad.prototype.drive.balance import PointMasses
 from tbcad.types import Floats
 
 EDGE_MM = 2.0  # wall beyond the outermost bosses
@@ -105,16 +107,21 @@ class BaseLayout:
             insertion=seats.insertion @ rotation,
         )
 
-    def outermost(self, swing: float) -> float:
-        """Largest azimuth, to either side, that the wall reaches over a swing, radians."""
-        return float(np.abs(self.sector).max() + swing / 2)
+    def point(self, along: float, out: float = 0.0, side: float = 0.0) -> Floats:
+        """A point along the axis, out from it at azimuth zero, and across, in the shell's frame."""
+        return np.asarray(np.array([along, out, side]) @ self.frame)
+
+    def cylinder(
+        self, start: float, end: float, radius: float, out: float = 0.0, side: float = 0.0
+    ) -> Cylinder:
+        """A cylinder between two places along the axis, or beside it, mm."""
+        first, last = (self.point(along, out, side) for along in (start, end))
+        return cylinder_between(first, last, radius)
 
 
-def base_layout(
-    spec: BaseSpec, prototype: PrototypeLayout, motion: Motion = AT_DEFAULT_SPEED
-) -> BaseLayout:
+def base_layout(spec: BaseSpec, prototype: PrototypeLayout) -> BaseLayout:
     """The base for a prototype's balls in motion; SpecError names what to change to fit."""
-    frame, seats = prototype.array.ellipsoid.frame(), seat_layout(spec, prototype, motion)
+    frame, seats = prototype.array.ellipsoid.frame(), seat_layout(spec, prototype)
     light = _light(spec, prototype)
     _check_fronts(seats, light, frame)
     hub = hub_layout(spec, _hub_front(spec, seats, frame, light))
@@ -288,3 +295,62 @@ def _protruding(spec: BaseSpec, seats: Seats, frame: Floats, outer: Floats) -> S
             break
         back += np.maximum(missing, 0)
     return replace(seats, back=back)
+
+
+def carrier_masses(base: BaseLayout, density: float) -> PointMasses:
+    """An estimate of the carrier's pieces as point masses, by a density in g/cm^3.
+
+    Wall and rings are solids of revolution (Pappus), ribs are plates, bosses and hub are cylinders;
+    flanges of joints, numbers and screw holes are left out. It chooses a drive early and serves
+    overviews; the solids decide.
+    """
+    inner, outer = base.inner, base.outer
+    wall = np.stack([inner[:-1], inner[1:], outer[1:], outer[:-1]], axis=1)
+    revolved = _revolved(base, np.concatenate([wall, np.stack(base.rings)]))
+    pieces = [revolved, _rib_masses(base), _boss_masses(base), _hub_masses(base)]
+    volume, centre = (np.concatenate(each) for each in zip(*pieces, strict=True))
+    return PointMasses(volume / 1000 * density, centre)
+
+
+def _revolved(base: BaseLayout, quads: Floats) -> tuple[Floats, Floats]:
+    """Volumes (n,) and centres (n, 3) of quadrilaterals (n, 4, 2) of (z, r) over the sector."""
+    middle, (low, high) = quads.mean(axis=1), base.sector
+    angle = high - low
+    # The centre of gravity of an arc is nearer to the axis by the chord over the arc.
+    arc = np.column_stack([middle[:, 0], middle[:, 1] * np.sin(angle / 2) / (angle / 2)])
+    centre = at_azimuths(arc, np.array([(low + high) / 2]))[0] @ base.axes
+    return _area(quads) * middle[:, 1] * angle, centre
+
+
+def _rib_masses(base: BaseLayout) -> tuple[Floats, Floats]:
+    """Each rib as one plate between the wall and the ribs' outline."""
+    section = np.vstack([base.outline, base.outer[::-1]])
+    volume = np.full(len(base.ribs), float(_area(section[None])[0]) * base.spec.rib_mm)
+    return volume, at_azimuths(section.mean(axis=0)[None], base.ribs)[:, 0] @ base.axes
+
+
+def _boss_masses(base: BaseLayout) -> tuple[Floats, Floats]:
+    """Bosses outside of the wall, without their cups and pockets."""
+    seats = base.seats
+    length = np.maximum(seats.back - seats.front - base.spec.thickness_mm, 0.0)
+    depth = seats.cup - seats.front
+    cup = np.pi * depth**2 * (3 * seats.cup - depth) / 3
+    pocket = np.pi * seats.pocket**2 * np.maximum(seats.bottom - seats.radius, 0.0)
+    volume = np.maximum(np.pi * seats.boss**2 * length - cup - pocket, 0.0)
+    return volume, seats.at_depth((seats.front + seats.back) / 2)
+
+
+def _hub_masses(base: BaseLayout) -> tuple[Floats, Floats]:
+    hub = base.hub
+    disc = np.pi * (hub.disc**2 - hub.bore**2) * (hub.front - hub.back)
+    boss = np.pi * max(hub.boss**2 - hub.bore**2, 0.0) * (hub.back - hub.face)
+    along = np.array([(hub.front + hub.back) / 2, (hub.back + hub.face) / 2])
+    return np.array([disc, boss]), along[:, None] * base.frame[0]
+
+
+def _area(polygons: Floats) -> Floats:
+    """Areas (n,) of polygons (n, p, 2), by the shoelace formula."""
+    x, y = np.moveaxis(polygons, -1, 0)
+    return np.asarray(
+        np.abs((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)) / 2
+    )

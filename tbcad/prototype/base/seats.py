@@ -14,10 +14,8 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.holding import (
-    AT_DEFAULT_SPEED,
     PAD_AZIMUTHS,
     WEB_MM,
-    Motion,
     first_ball,
     glue_wells,
     magnet_pockets,
@@ -90,10 +88,8 @@ class Seats:
         return self.centre[:, None] - distance * self.pad_normals
 
 
-def seat_layout(
-    spec: BaseSpec, prototype: PrototypeLayout, motion: Motion = AT_DEFAULT_SPEED
-) -> Seats:
-    """One seat for each body of the prototype, which holds it in a motion of the base.
+def seat_layout(spec: BaseSpec, prototype: PrototypeLayout) -> Seats:
+    """One seat for each body of the prototype, which holds it as the base moves.
 
     SpecError when a pad, pocket or magnet does not fit, or does not hold a ball: what to change.
     """
@@ -105,7 +101,7 @@ def seat_layout(
     _check_cups(spec, radius, pad, front, pad_angle)
     room = radius * np.sin(tilt) - pad * np.cos(tilt) - WEB_MM
     axes = _axes(prototype)
-    needed = worst_force_needed(prototype, axes, tilt, motion)
+    needed = worst_force_needed(prototype, axes, tilt)
     magnet, height, pocket = (
         glue_wells(prototype, needed, room)
         if spec.holds[0] == "glue"

@@ -14,13 +14,7 @@ from tbcad.cad.kernel.solids import common, cut, cylinder, polygon, prism, revol
 from tbcad.core.geometry.vectors import perpendicular_axes, unit
 from tbcad.core.spec.design import PrinterSpec
 from tbcad.prototype.base.hub import SCREW_MM
-from tbcad.prototype.base.joints import (
-    ACCESS_MM,
-    LABEL_MM,
-    Joint,
-    flange_profile,
-    joint_hardware,
-)
+from tbcad.prototype.base.joints import ACCESS_MM, LABEL_MM, Joint, flange_profile, joint_hardware
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.base.split import BaseSplit, downward_directions
 from tbcad.prototype.printed import PlacedSolid, placed_on_bed

@@ -4,6 +4,7 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -189,6 +190,17 @@ class PartsList:
     """Rows of bom.csv, and their sums."""
 
     rows: tuple[Row, ...]
+    design: str = ""  # what drawings call it
+
+    @cached_property
+    def items(self) -> dict[str, int]:
+        """Number of each part."""
+        return {str(row["part"]): int(row["item"] or 0) for row in self.rows}
+
+    @cached_property
+    def quantities(self) -> dict[str, int]:
+        """Quantity of each part."""
+        return {str(row["part"]): int(row["quantity"] or 0) for row in self.rows}
 
     def record(self) -> dict[str, Any]:
         """For other programs: the sums, then all rows by the columns of bom.csv."""

@@ -1,5 +1,7 @@
 """prototype.json of a prototype that is built: each section from what it describes."""
 
+from fnmatch import fnmatchcase
+
 import numpy as np
 
 from tbcad.cad.drafting.sheet import Sheet
@@ -8,7 +10,6 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.arrangement import PrototypeModel
 from tbcad.prototype.base.caps import cap_limits, holding
-from tbcad.prototype.base.holding import base_motion
 from tbcad.prototype.drive.balance import BaseBalance, power_off, stop_sequence
 from tbcad.prototype.drive.drive import (
     HOLD_MARGIN,
@@ -22,7 +23,10 @@ from tbcad.prototype.drive.drive import (
 from tbcad.prototype.electronics import phases
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import totals
-from tbcad.prototype.frame.camera_gauge import marks_seen
+from tbcad.prototype.frame.camera_gauge import CameraGauge, marks_seen
+from tbcad.prototype.frame.camera_mount import CameraMount
+from tbcad.prototype.frame.stock import Stock
+from tbcad.prototype.homing import HomingLayout
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout
 from tbcad.prototype.printed import PrintedPart
@@ -44,19 +48,15 @@ STEP, GLB, BALLS_FILE = "prototype.step", "prototype.glb", "balls.csv"
 PAD_UM = 10.0  # largest error of a ball's centre, found from its pads
 # Fasteners that are bought black, so that the camera does not see them shine.
 BLACK_KINDS = frozenset({"screws", "setscrews", "washers", "nuts", "tnuts"})
-# Purchased bodies that the camera sees between the balls: painted, blackened or taped.
-BLACKENED = frozenset(
-    {
-        *("plate", "upright_left", "upright_right", "home_switch", "motor"),
-        *("rotary_stage", "rotary_stage_top", "wheel", "pinion", "coupling", "shaft", "collar"),
-    }
-)
+# Purchased bodies; the others, which the camera sees between the balls, are painted or taped.
+NOT_BLACKENED = ("bearing_*", "camera", "lamp_*")
 
 
 def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Sheet]) -> Prototype:
     """What is known of the prototype, in numbers, but its steps of assembly."""
     layout, spec, frame = built.layout, built.spec.prototype, built.frame
-    angles, leds = frame.homing.angles, len(built.stage.leds)
+    homing, stock, leds = frame.of(HomingLayout), frame.of(Stock), len(built.stage.leds)
+    angles = homing.angles
     low, high = np.radians([angles.switch, angles.switch + angles.travel]).tolist()
     axis, zero, third = (layout.array.ellipsoid.frame() + 0.0).tolist()
     return Prototype(
@@ -69,7 +69,7 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         balls=BALLS_FILE,
         alternatives=layout.alternatives,
         seats=_seats(built),
-        holding=holding(built.base, layout, base_motion(built.spec), built.parts),
+        holding=holding(built.base, layout, built.parts),
         parts=tuple(map(_part, built.printed)),
         leds=tuple(
             records.Led(name=name, position_mm=(place + 0.0).tolist(), direction=way.tolist())
@@ -77,9 +77,7 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         ),
         calibration=_calibration(built),
         controller=Controller(
-            firmware=spec.motion.controller,
-            axis=spec.motion.axis,
-            phases=phases(leds, spec.motion),
+            firmware=spec.motion.controller, axis=spec.motion.axis, phases=phases(leds, spec.motion)
         ),
         caps=cap_limits(built.spec, built.base, layout),
         camera_place=_camera_place(built),
@@ -87,8 +85,8 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
             switch_deg=angles.switch,
             homed_deg=angles.homed,
             travel_deg=angles.travel,
-            pin=frame.homing.pin,
-            zero_error_deg=frame.homing.error_deg,
+            pin=homing.pin,
+            zero_error_deg=homing.error_deg,
         ),
         bought=tuple(
             records.PurchasedBody(
@@ -96,15 +94,15 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
                 what=item.what,
                 part=item.part,
                 turns=item.rotates,
-                finish=MATT_BLACK if item.name in BLACKENED else None,
+                finish=_body_finish(item.name),
             )
             for item in frame.purchased
         ),
-        lamps=_lamps(frame.lamps),
+        lamps=_lamps(frame.find(LampLayout)),
         shroud=_shroud(built.shroud),
         fasteners=tuple(map(_fastener, built.fasteners)),
         frame_stock=records.FrameStock(
-            plate=frame.plate.name, upright=frame.upright.name, uprights_cut_to_mm=frame.length
+            plate=stock.plate.name, upright=stock.upright.name, uprights_cut_to_mm=stock.length
         ),
         totals=records.ListTotals(**totals(bill)),
         drawings=tuple(
@@ -117,6 +115,10 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
             built.balance, low, high, holds_itself=built.drive.efficiency < SELF_LOCKING
         ),
     )
+
+
+def _body_finish(name: str) -> str | None:
+    return None if any(fnmatchcase(name, one) for one in NOT_BLACKENED) else MATT_BLACK
 
 
 def drive_record(
@@ -164,7 +166,7 @@ def _swing(built: PrototypeModel, motion: MotionSpec) -> tuple[float, float]:
     todo = stop_sequence(built.layout, motion)
     angles = [todo.start, motion.home_deg, *todo.angle.tolist()]
     if motion.controller == "grblhal":
-        angles.append(built.frame.homing.angles.switch)
+        angles.append(built.frame.of(HomingLayout).angles.switch)
     return min(angles), max(angles)
 
 
@@ -210,12 +212,12 @@ def _calibration(built: PrototypeModel) -> records.CentreEstimate | None:
 
 def _camera_place(built: PrototypeModel) -> records.CameraPlace | None:
     """The mount's travel, the gauge's marks, its pictures and errors; None without a camera."""
-    gauge, mount = built.gauge, built.frame.mount
+    gauge, mount = built.frame.find(CameraGauge), built.frame.find(CameraMount)
     if gauge is None or mount is None:
         return None
     sizes, camera = gauge.sizes, built.layout.array.camera
     return records.CameraPlace(
-        gauge=gauge.component.name,
+        gauge=gauge.tools[0].name,
         marks_mm=(gauge.marks + 0.0).tolist(),
         lengths_mm=records.GaugeLengths(
             hub_to_near=sizes.near - sizes.hub,
@@ -242,7 +244,7 @@ def _lamps(lamps: LampLayout | None) -> LampsRecord | None:
         level=lamps.level,
         places=tuple(
             LampPlace(name=body.name, position_mm=place, direction=direction)
-            for body, place, direction in zip(lamps.bodies, places, inward, strict=True)
+            for body, place, direction in zip(lamps.purchased, places, inward, strict=True)
         ),
         lumen_each=lamps.lumen,
         watt=lamps.watt,

@@ -13,7 +13,7 @@ from tbcad.cad.formats.checked_files import Cell, Row
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.drive import DriveLoads
-from tbcad.prototype.frame.layout import FrameLayout
+from tbcad.prototype.frame.stock import Stock
 from tbcad.records.tables import BallRow, PictureRow, StopRow
 from tbcad.types import Floats
 
@@ -121,14 +121,14 @@ def stop_rows(layout: PrototypeLayout, balance: BaseBalance, loads: DriveLoads) 
     return _rows(STOP_COLUMNS, cells)
 
 
-def hole_rows(frame: FrameLayout) -> list[Row]:
+def hole_rows(stock: Stock) -> list[Row]:
     """One row for each hole of the plate, numbered from 1.
 
     x runs along the plate, from the uprights to the camera, and y across it, both from the corner
     that is behind on the right when one looks from the uprights to the camera.
     """
-    places = (frame.holes - frame.corner + 0.0).tolist()
-    held = enumerate(zip(places, frame.holds, strict=True), 1)
+    places = (stock.holes - stock.corner + 0.0).tolist()
+    held = enumerate(zip(places, stock.holds, strict=True), 1)
     return _rows(HOLE_COLUMNS, ((number, x, y, THREAD, name) for number, ((x, y), name) in held))
 
 

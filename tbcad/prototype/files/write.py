@@ -25,28 +25,23 @@ from tbcad.common.schedule import Submit
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
-from tbcad.prototype import electronics
 from tbcad.prototype.arrangement import PrototypeModel, arrangements
 from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.prototype.assembly_steps.steps import mounting_record
-from tbcad.prototype.base.caps import cap_limits
-from tbcad.prototype.drawings.caps import cap_sheet
-from tbcad.prototype.drawings.parts import listed, sheets
+from tbcad.prototype.base.caps import cap_limits, cap_sheet
 from tbcad.prototype.drive.drive import base_torques, drive_loads
+from tbcad.prototype.electronics import Wiring
 from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
 from tbcad.prototype.files import bom, controllers, tables
 from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record
+from tbcad.prototype.frame.stock import Stock
 from tbcad.prototype.light.shroud import pattern
 from tbcad.prototype.model import build_prototype_model
-from tbcad.prototype.printed import (
-    PrintedPart,
-    Role,
-    component_solid,
-    part_mesh,
-    print_estimate,
-)
+from tbcad.prototype.printed import PrintedPart, Role, component_solid, part_mesh, print_estimate
 from tbcad.prototype.purchased.parts import Prices, load_prices
+from tbcad.prototype.registry import PARTS
 from tbcad.records.prototype import NAME
+from tbcad.records.tables import WiringRow
 from tbcad.types import Progress
 
 METAL: Colour = (0.55, 0.56, 0.58, 1.0)
@@ -94,13 +89,14 @@ def export_prototype(
     write_assembly(folder / STEP, "prototype", groups)
     bill = _bill(built, [estimate.result() for estimate in prints], prices)
     write_table(folder / bom.NAME, bom.COLUMNS, bill)
-    drawings = sheets(built.frame, built.base, built.drive, listed(title, bill))
+    listed = bom.PartsList(tuple(bill), title)
+    drawings = [sheet for part in PARTS for sheet in part.sheets(built, built.frame, listed)]
     for sheet in drawings:
         submit(sheet.write, folder)
     record = prototype_record(built, bill, drawings)
     caps = enumerate(built.layout.balls.cap.tolist(), 1)
     sizes = {ball: "" for ball, cap in caps if not cap}
-    steps = mounting_record(AssembledMachine((), record, (), sizes, built.parts))
+    steps = mounting_record(AssembledMachine(listed, record, (), sizes, built.parts))
     record.model_copy(update={"assembly_steps": steps}).write(folder / NAME)
     return spec
 
@@ -133,12 +129,8 @@ def _write_tables(built: PrototypeModel, folder: Path) -> None:
         (BALLS_FILE, tables.BALL_COLUMNS, tables.ball_rows(layout)),
         ("rotation_plan.csv", tables.PICTURE_COLUMNS, tables.picture_rows(layout)),
         ("stops.csv", tables.STOP_COLUMNS, tables.stop_rows(layout, built.balance, loads)),
-        ("plate_holes.csv", tables.HOLE_COLUMNS, tables.hole_rows(built.frame)),
-        (
-            "wiring.csv",
-            electronics.COLUMNS,
-            electronics.wiring_rows(built.wiring, built.frame.lamps, built.drive),
-        ),
+        ("plate_holes.csv", tables.HOLE_COLUMNS, tables.hole_rows(built.frame.of(Stock))),
+        (WiringRow.FILE, WiringRow.columns(), built.frame.of(Wiring).rows),
     ):
         write_table(folder / name, columns, rows)
     texts = controllers.controller_files(

@@ -14,12 +14,15 @@ from typing import Literal
 
 import numpy as np
 
-from tbcad.core.camera.requirements import CameraRequirements
+from tbcad.core.camera.requirements import CameraRequirements, camera_requirements
 from tbcad.core.geometry.primitives import Component, Prism, box
 from tbcad.core.geometry.rotations import even_angles, rotated_about_x, unit_circle
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned
 from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.frame.camera_mount import CameraMount
+from tbcad.prototype.part import FrameLayout, Mounted, Part, Site
 from tbcad.records.prototype import MarkPicture
 from tbcad.types import Floats
 
@@ -69,11 +72,10 @@ class Sight:
     to_zero: float  # part of the optical axis along azimuth zero
 
 
-@dataclass(frozen=True)
-class CameraGauge:
-    """The gauge, and what it tells."""
+@dataclass(frozen=True, kw_only=True)
+class CameraGauge(Mounted):
+    """The gauge, a tool on the hub at base angle zero, and what it tells."""
 
-    component: Component  # the part, on the hub at base angle zero
     sizes: GaugeSizes  # where its marks are
     # near and far mark of the side at positive azimuths, then of the other, at base angle zero, mm,
     # (2, 2, 3)
@@ -84,17 +86,13 @@ class CameraGauge:
     errors: dict[str, float]
 
 
-def camera_gauge(
-    base: BaseLayout,
-    camera: Camera,
-    diameter: float,
-    needed: CameraRequirements,
-    swing: tuple[float, float],
-) -> CameraGauge:
-    """The gauge whose marks tell most of the pinhole's place.
-
-    diameter is that of the camera's body (mm), swing the smallest and largest base angle (radians).
-    """
+def camera_gauge(site: Site, before: FrameLayout) -> CameraGauge | None:
+    """The gauge whose marks tell most of the pinhole's place; None without a camera."""
+    if before.find(CameraMount) is None:
+        return None
+    base, camera, swing = site.base, site.layout.array.camera, site.layout.stops.range
+    needed = camera_requirements(site.layout.array, site.spec.optics.capture_diameter_mm / 2)
+    diameter = site.spec.prototype.camera_diameter_mm
     distance, pitch = float(norm(camera.pinhole)), camera.pixel_pitch
     sights = _sights(base, camera, diameter, needed)
     sight = min(sights, key=lambda one: max(place_errors(one, pitch, needed).values()))
@@ -110,7 +108,7 @@ def camera_gauge(
     across = np.array([[1.0], [-1.0]]) * [sizes.near_half, sizes.far_half]
     along = np.broadcast_to([sizes.near, sizes.far], across.shape)
     return CameraGauge(
-        component=_component(base, sizes),
+        tools=(_component(base, sizes),),
         sizes=sizes,
         marks=np.stack([along, across, 0 * across], axis=-1) @ _axes(base),
         angles=(max(-QUARTER_DEG, low), 0.0, min(QUARTER_DEG, high)),
@@ -205,7 +203,7 @@ def _component(base: BaseLayout, sizes: GaugeSizes) -> Component:
     )
     added = (
         *(
-            box(np.array([low, -half, level]), np.array([high, half, THICKNESS_MM]), axes)
+            box((low, -half, level), (high, half, THICKNESS_MM), axes)
             for half, low, high, level in blocks
         ),
         *(_far_end(sizes, side, axes) for side in (1, -1)),
@@ -222,3 +220,51 @@ def _far_end(sizes: GaugeSizes, side: int, axes: Floats) -> Prism:
     corners = [(sizes.far, half), (sizes.far, end), (back, end), (back, beyond)]
     points = np.array([[along, side * across, 0.0] for along, across in corners])
     return Prism(points @ axes, THICKNESS_MM * axes[2])
+
+
+@planned("Camera in its place", "camera_gauge", near=("carrier",))
+def gauge_step(machine: AssembledMachine) -> Words:
+    """The camera's alignment by the gauge."""
+    place = machine.record.camera_place
+    assert place is not None
+    sizes, error, travel = place.lengths_mm, place.error, place.travel
+    does = [
+        "Take the stage's post out of its clamp. Measure the gauge: both widths between the edges "
+        "that face each other. Sand the near arm's ends, or tape them, until near_width is "
+        "far_width x (H - hub_to_near) / (H - hub_to_far), H = hub_to_pinhole.",
+        "Gauge into the hub's bore, arms level and marked face up, flange flat on the hub; hold it "
+        "with tape. Zero pin in at zero.",
+        "Focus and stop the lens as camera.json has it: both move the pinhole.",
+        "Base at zero: turn yaw, roll and pitch until the near marks are within 10 pixels of the "
+        "place that the checks name.",
+        "Move the camera along its axis until the near arm's ends just touch the far arm's edges "
+        "in the picture. Gaps of one width: too far. Overlaps: too near. If they differ, it is the "
+        "gauge or the place across, which the next pictures tell apart.",
+        "Zero pin out. Base at -90 and 90 degrees: marked faces in one line (across), ends "
+        "touching (out). What is alike in both pictures with opposite signs is the gauge's error; "
+        "their mean is the camera's.",
+        "Repeat until every mean is below half a pixel (0.1 mm is about a pixel). Tighten all "
+        "screws, look once more. Take the gauge off, put the post back. The camera may be taken "
+        "off later: the fence brings it back.",
+    ]
+    checks = [
+        f"Before sanding: near_width {sizes.near_width:.2f}, far_width {sizes.far_width:.2f}, "
+        f"hub_to_near {sizes.hub_to_near:.2f}, hub_to_far {sizes.hub_to_far:.2f}, "
+        f"hub_to_pinhole {sizes.hub_to_pinhole:.2f} mm.",
+        *(
+            f"Base at {one.base_angle_deg:.0f} degrees: the {one.side} mark appears at column "
+            f"{one.column_px:.0f}, row {one.row_px:.0f}."
+            for one in place.pictures
+        ),
+        f"The pinhole is then known to {error.along_mm:.2f} mm along, {error.across_mm:.2f} across "
+        f"and {error.out_mm:.2f} out.",
+    ]
+    fit = (
+        f"Travel: along {travel.along_axis_mm:g} mm, across {travel.across_mm:g}, out "
+        f"{travel.out_mm:g}, yaw {travel.yaw_deg:.0f} degrees, roll {travel.roll_deg:.0f}, "
+        f"pitch {travel.pitch_deg:.0f}"
+    )
+    return does, checks, [fit]
+
+
+GAUGE = Part((gauge_step,), camera_gauge)

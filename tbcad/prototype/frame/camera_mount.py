@@ -16,6 +16,7 @@ import numpy as np
 
 from tbcad.core.geometry.primitives import (
     Component,
+    Cylinder,
     Primitive,
     Prism,
     box,
@@ -26,16 +27,17 @@ from tbcad.core.geometry.primitives import (
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec
+from tbcad.core.spec.prototype import PrototypeSpec
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.purchased import (
+from tbcad.prototype.frame.shared import (
     CLEARANCE_HOLE_MM,
     OVERLAP_MM,
     THROUGH_MM,
-    Bracket,
     level_prism,
     webs,
 )
+from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.records.prototype import CameraTravel
 from tbcad.types import Floats
@@ -71,17 +73,14 @@ BRACKET_FOOT_MM = 70.0  # length of the foot beyond the bracket
 FOOT_BORDER_MM = 15.0  # of the foot beside the bracket: washers clear the webs by 1 mm
 WEB_SETBACK_MM = 4.0  # of webs from the ends of their flanges
 SLOT_SIDE_MM, SLOT_INNER_MM, SLOT_OUTER_MM = 9.0, 20.0, 14.0  # from the foot's edges to its slots
+REMEDY = "prototype.frame.camera_screw_mm larger or prototype.camera_diameter_mm smaller"
 AXIAL = 1e-6  # largest part of the camera's direction out of the frame's plane
 
 
-@dataclass(frozen=True)
-class CameraMount:
-    """The parts that hold the camera."""
+@dataclass(frozen=True, kw_only=True)
+class CameraMount(Mounted):
+    """The bracket on the base plate, the camera's plate on three screws, and the fence on that."""
 
-    bracket: Bracket  # on the base plate
-    plate: Component  # for the camera, on three screws
-    fence: Component  # on the plate, below the camera
-    fasteners: tuple[Fastener, ...]  # of them, without the screws in the base plate
     travel: CameraTravel  # how far the camera moves to either side
 
 
@@ -102,11 +101,6 @@ class _Place:
         return np.stack([back, self.axes[1], unit(level - (level @ back) * back)])
 
     @property
-    def frame(self) -> FrameSpec:
-        """The section of the frame."""
-        return self.spec.frame
-
-    @property
     def radius(self) -> float:
         """Of the camera's body: its optical axis over the camera plate."""
         return self.spec.camera_diameter_mm / 2
@@ -119,7 +113,7 @@ class _Place:
     @property
     def along(self) -> float:
         """Travel of the camera along its axis to either side."""
-        return self.frame.camera_travel_mm / 2
+        return self.spec.frame.camera_travel_mm / 2
 
     @property
     def fence_screws(self) -> float:
@@ -152,7 +146,7 @@ class _Place:
     def screws(self) -> Floats:
         """Places (3, 2) of the three screws: behind the pinhole, and across."""
         upper = TOP_MM + UPPER_MM
-        beyond = self.frame.camera_screw_mm + self.recess + self.insert["outer_mm"]
+        beyond = self.spec.frame.camera_screw_mm + self.recess + self.insert["outer_mm"]
         lower = max(TOP_MM + LOWER_MM, beyond)
         return np.array([[upper, -PAIR_MM], [upper, PAIR_MM], [lower, 0.0]])
 
@@ -162,7 +156,7 @@ class _Place:
 
     def block(self, low: tuple[float, float, float], high: tuple[float, float, float]) -> Prism:
         """A box between two points of the camera's own axes."""
-        local = box(np.array(low), np.array(high), self.own)
+        local = box(low, high, self.own)
         return Prism(local.corners + self.camera.pinhole, local.along)
 
     def hole(self, back: float, across: float, out: tuple[float, float], size: float) -> Primitive:
@@ -179,19 +173,23 @@ class _Place:
         return slot(start, self.own[along], 2 * travel, M5_HOLE_MM / 2, depth)
 
 
-def camera_mount(spec: PrototypeSpec, axes: Floats, camera: Camera, parts: Parts) -> CameraMount:
-    """Bracket, plate and fence for a camera; axes (3, 3) are the frame's, as rows.
+def camera_mount(site: Site, _: FrameLayout) -> CameraMount | None:
+    """Bracket, plate and fence for a camera, and its body; None without a camera.
 
     SpecError when the camera does not look along the frame's plane, its thread lies beyond its end,
     or camera or mount reach the base plate.
     """
-    place = _Place(spec, axes, camera, parts[INSERT])
+    spec, camera, parts = site.spec.prototype, site.layout.array.camera, site.parts
+    if not spec.camera_diameter_mm:
+        return None
+    place = _Place(spec, site.axes, camera, parts[INSERT])
     _check_camera(place)
+    body = Cylinder(camera.pinhole, -camera.forward, place.radius, spec.camera_length_mm)
     play = float(np.degrees(np.arctan((M5_HOLE_MM - M5_MM) / spec.frame.flange_mm)))
     return CameraMount(
-        bracket=_bracket(place),
-        plate=_plate(place),
-        fence=_fence(place),
+        brackets=(_bracket(place),),
+        printed=(_plate(place), _fence(place)),
+        purchased=(Component("camera", "camera behind its pinhole", (body,)),),
         fasteners=_fasteners(place, parts),
         travel=CameraTravel(
             along_axis_mm=place.along,
@@ -211,14 +209,14 @@ def _fasteners(place: _Place, parts: Parts) -> tuple[Fastener, ...]:
         *(_tilting_screw(place, back, across, parts) for back, across in place.screws.tolist()),
         *(_fence_screw(place, side * FENCE_SCREW_MM, parts) for side in (-1, 1)),
     ]
-    at = place.point(place.frame.camera_screw_mm, 0.0, place.radius + TRIPOD_MM)
+    at = place.point(place.spec.frame.camera_screw_mm, 0.0, place.radius + TRIPOD_MM)
     tripod = Fastener(parts[CAMERA_SCREW], at, -place.own[2], ("camera_plate", "camera"))
     return (*(one for some in screws for one in some), tripod)
 
 
 def _tilting_screw(place: _Place, back: float, across: float, parts: Parts) -> tuple[Fastener, ...]:
     """A screw through the bracket into the plate's insert, with a nut against either."""
-    flange, out = place.frame.flange_mm, place.own[2]
+    flange, out = place.spec.frame.flange_mm, place.own[2]
     length = WASHER_MM + flange + GAP_MM + OUT_MM + MIN_ENGAGEMENT_MM
     screw, washer, nut = choose_screw(parts, M5_MM, length), parts[WASHER], parts[NUT]
     bracket, plate = ("camera_bracket",), ("camera_plate",)
@@ -257,7 +255,7 @@ def _plate(place: _Place) -> Component:
     """The plate that carries the camera: inserts for three screws, slots for tripod and fence."""
     near, far = place.radius, place.radius + PLATE_MM
     through = (near - THROUGH_MM, far + THROUGH_MM)
-    screw, recess = place.frame.camera_screw_mm, place.recess
+    screw, recess = place.spec.frame.camera_screw_mm, place.recess
     tripod = place.point(screw, 0.0, through[0])
     depth = (through[1] - through[0]) * place.own[2]
     removed: list[Primitive] = [
@@ -267,8 +265,7 @@ def _plate(place: _Place) -> Component:
     removed.append(slot(tripod, place.own[0], 2 * place.along, TRIPOD_HOLE_MM / 2, depth))
     removed.append(
         place.block(
-            (screw - recess, -RECESS_MM, near + TRIPOD_MM),
-            (screw + recess, RECESS_MM, through[1]),
+            (screw - recess, -RECESS_MM, near + TRIPOD_MM), (screw + recess, RECESS_MM, through[1])
         )
     )
     for across in (-FENCE_SCREW_MM, FENCE_SCREW_MM):
@@ -297,7 +294,7 @@ def _fence(place: _Place) -> Component:
 
 def _bracket(place: _Place) -> Bracket:
     """The bracket on the base plate: slots across for three screws, a window for the key."""
-    frame, axes, low = place.frame, place.axes, place.frame.floor_mm
+    frame, axes, low = place.spec.frame, place.axes, place.spec.frame.floor_mm
     near, far = place.bracket_at, place.bracket_at + frame.flange_mm
 
     def at(back: float, out: float) -> Floats:
@@ -345,7 +342,7 @@ def _bracket(place: _Place) -> Bracket:
 
 
 def _check_camera(place: _Place) -> None:
-    frame, along = place.frame, place.along
+    frame, along = place.spec.frame, place.along
     length = place.spec.camera_length_mm
     if abs(float(place.camera.forward @ place.axes[1])) > AXIAL:
         raise SpecError(
@@ -371,3 +368,31 @@ def _check_camera(place: _Place) -> None:
             f"the camera reaches down to {lowest:.0f} mm, below the base plate: make "
             f"prototype.frame.floor_mm less than {lowest:.0f}"
         )
+
+
+@planned(
+    "Bracket, plate and fence of the camera",
+    *("camera_bracket", "camera_plate", "camera_fence", "camera"),
+)
+def camera_step(machine: AssembledMachine) -> Words:
+    """The camera's mount."""
+    does = [
+        "Press the inserts into the camera plate from behind.",
+        "Bracket on the base plate with washers, in the middle of its slots.",
+        "Three long screws with washers from behind through the bracket's slots; on each between "
+        "bracket and plate a washer and two nuts, then into the plate's inserts. "
+        f"{GAP_MM:g} mm between plate and bracket. The nut at the plate locks the screw, the other "
+        "one clamps the bracket.",
+        "Camera and lens are not in the list: camera.json has what they must do, and tbcad camera "
+        "shows which on sale do it.",
+        "Fence on the plate. Then your camera on the plate by its tripod thread, its back against "
+        "the fence.",
+    ]
+    checks = [
+        f"The gap between plate and bracket is {GAP_MM:g} mm at all three screws, to 0.5 mm.",
+        "The camera looks at the object, and cannot be turned on its screw by hand.",
+    ]
+    return does, checks
+
+
+CAMERA = Part((camera_step,), camera_mount, remedies={"camera*": REMEDY})

@@ -4,7 +4,7 @@ It is a plate across the axis with a tube for the bearings, held by a flange on 
 webs between plate and flange leave space for tube and motor.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,31 +18,33 @@ from tbcad.core.geometry.primitives import (
 )
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import FrameSpec
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.base.fasteners import m3_insert
 from tbcad.prototype.base.hub import PIN_OUT_MM
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drive.drive import Drive
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.purchased import (
-    CLEARANCE_HOLE_MM,
+from tbcad.prototype.frame.driven import (
     COUPLING_MM,
+    STAGE_HEIGHT_MM,
+    ShaftParts,
+    motor_fasteners,
+    motor_screw_places,
+    purchased_components,
+    wheel_radius,
+)
+from tbcad.prototype.frame.shared import (
+    CLEARANCE_HOLE_MM,
+    GAP_MM,
     HALF_FLANGE_MM,
     OVERLAP_MM,
     PLATE_MM,
-    STAGE_HEIGHT_MM,
     THROUGH_MM,
+    BearingHead,
     HeadPlate,
-    ShaftParts,
-    axial_cylinder,
     drilled_holes,
-    hub_point,
     level_prism,
-    motor_fasteners,
-    motor_screw_places,
     on_uprights,
-    purchased_components,
     webs,
-    wheel_radius,
 )
 from tbcad.prototype.homing import (
     MARK_DEPTH_MM,
@@ -53,12 +55,12 @@ from tbcad.prototype.homing import (
     bracket_screws,
     tab_radius,
 )
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part
+from tbcad.prototype.part import FrameLayout, Part, Site
+from tbcad.prototype.purchased.parts import Parts, choose_part
 from tbcad.types import Floats
 
 # Behind the head of a rotary stage's screw (M6, ISO 4762): room for it, and the length of its key.
 M6_HEAD_MM, HEAD_PLAY_MM, KEY_ROOM_MM = 10.0, 0.5, 95.0
-GAP_MM = 5.0  # between what turns and the plate: the heads of the wheel's screws are in it
 RELIEF_MM = 0.3  # round a bearing, where it passes
 SHOULDER_MM = 3.0  # width of the shoulder behind a bearing
 TUBE_WALL_MM = 6.0  # of the tube round the bearings
@@ -75,36 +77,21 @@ PILOT_PLAY_MM = 0.2
 WINDOW_PLAY_MM, WINDOW_BEYOND_MM = 1.0, 20.0  # round a motor on the axis, and behind it
 
 
-@dataclass(frozen=True)
-class BearingHead:
-    """The head of the frame."""
-
-    component: Component  # the printed part
-    plate: HeadPlate  # across the axis
-    purchased: tuple[Component, ...]  # what is in it: bearings, shaft, collar, wheels, motor
-    fasteners: tuple[Fastener, ...]  # that hold it and the motor, and the inserts in its side
-    rear: float  # coordinate of the tube's end along w, from the origin, mm
-    shaft: PurchasedPart | None  # in the bearings, if any
-    face: float  # level coordinate of the flange's face on the uprights, mm
-    top: float  # height of the flange's upper end, mm
-
-
-def bearing_head(
-    spec: FrameSpec, base: BaseLayout, drive: Drive, axes: Floats, parts: Parts
-) -> BearingHead:
-    """The head for a drive behind the base's hub; axes (3, 3) are the frame's, as rows.
+def bearing_head(site: Site, _: FrameLayout) -> BearingHead:
+    """The head for a drive behind the base's hub.
 
     SpecError when there is no bearing or shaft for the hub's bore, or the motor meets it.
     """
-    plate = _behind_disc(_head_plate(spec, base, drive), base, axes)
-    shaft_parts = _shaft_parts(base, plate, parts) if drive.belt else None
-    edge = axes @ hub_point(base, plate.back, plate.low)
+    spec, base, axes, parts = site.spec.prototype.frame, site.base, site.axes, site.parts
+    plate = _behind_disc(_head_plate(site), base, axes)
+    shaft_parts = _shaft_parts(base, plate, parts) if site.drive.belt else None
+    edge = axes @ base.point(plate.back, plate.low)
     face = float(edge[0] + OVERLAP_MM - spec.flange_mm)
     low, top = float(edge[2]) - BELOW_MM, float(edge[2]) + ABOVE_MM - plate.low
-    corner = np.array([plate.front, plate.high, plate.half_width])
-    body = box(np.array([plate.back, plate.low, -plate.half_width]), corner, base.frame)
-    added = [body, *_flange(spec, base, plate, axes, (face, low, top))]
-    removed = _motor_holes(spec, base, drive, plate)
+    corner = plate.front, plate.high, plate.half_width
+    body = box((plate.back, plate.low, -plate.half_width), corner, base.frame)
+    added = [body, *_flange(site, plate, (face, low, top))]
+    removed = _motor_holes(site, plate)
     removed += _zero_holes(base, plate)
     sides = (-spec.uprights_mm / 2, spec.uprights_mm / 2)
     heights = (low + SCREW_EDGE_MM, top - SCREW_EDGE_MM)
@@ -113,7 +100,7 @@ def bearing_head(
     removed += drilled_holes(screws, spec.flange_mm * axes[0], CLEARANCE_HOLE_MM[5.0])
     if shaft_parts:
         rear, radius = shaft_parts.rear, shaft_parts.tube
-        added.append(axial_cylinder(base, plate.front - OVERLAP_MM, rear, radius))
+        added.append(base.cylinder(plate.front - OVERLAP_MM, rear, radius))
         removed += _seats(spec, base, plate, shaft_parts)
     w = base.frame[0]
     component = Component(
@@ -124,22 +111,23 @@ def bearing_head(
         (w, -w, axes[0], -axes[0], axes[1]),
     )
     return BearingHead(
-        component=component,
+        printed=(component,),
         plate=plate,
-        purchased=purchased_components(base, drive, plate, shaft_parts),
+        purchased=purchased_components(site, plate, shaft_parts),
         fasteners=(
             *on_uprights(component.name, screws, -axes[0], spec.flange_mm, parts),
-            *motor_fasteners(base, drive, plate, parts),
+            *motor_fasteners(site, plate),
             *(
                 Fastener(
                     insert,
-                    hub_point(base, beside, out, plate.half_width),
+                    base.point(beside, out, plate.half_width),
                     -base.frame[2],
                     (component.name,),
                 )
                 for out in bracket_screws()
             ),
         ),
+        listed=shaft_parts.listed if shaft_parts else {},
         rear=shaft_parts.rear if shaft_parts else plate.back,
         shaft=shaft_parts.shaft if shaft_parts else None,
         face=face,
@@ -155,7 +143,8 @@ def _behind_disc(plate: HeadPlate, base: BaseLayout, axes: Floats) -> HeadPlate:
     return replace(plate, low=min(plate.low, float(low)))
 
 
-def _head_plate(spec: FrameSpec, base: BaseLayout, drive: Drive) -> HeadPlate:
+def _head_plate(site: Site) -> HeadPlate:
+    spec, base, drive = site.spec.prototype.frame, site.base, site.drive
     reach, face, half_webs = drive.centre_mm, base.hub.mount, WEB_MM + spec.web_mm + WEB_EDGE_MM
     if drive.wheel and drive.belt:
         half_motor = drive.motor["frame_mm"] / 2 + spec.belt_travel_mm / 2
@@ -188,20 +177,14 @@ def _shaft_parts(base: BaseLayout, plate: HeadPlate, parts: Parts) -> ShaftParts
     return ShaftParts(bearing, shaft, collar, rear, bearing["outer_mm"] / 2 + TUBE_WALL_MM)
 
 
-def _flange(
-    spec: FrameSpec,
-    base: BaseLayout,
-    plate: HeadPlate,
-    axes: Floats,
-    at: tuple[float, float, float],
-) -> list[Primitive]:
+def _flange(site: Site, plate: HeadPlate, at: tuple[float, float, float]) -> list[Primitive]:
     """Flange with its face at a level coordinate, between two heights, and its webs."""
-    face, low, top = at
+    spec, base, axes, (face, low, top) = site.spec.prototype.frame, site.base, site.axes, at
     half = spec.uprights_mm / 2 + HALF_FLANGE_MM
     front, inside = face + spec.flange_mm, face + spec.flange_mm - OVERLAP_MM
     flange = level_prism(rectangle((face, low), (front, top)), -half, half, axes)
     # The webs' one edge lies within the plate, its line prolonged into the flange.
-    start = axes @ hub_point(base, plate.back + OVERLAP_MM, 0.0)
+    start = axes @ base.point(plate.back + OVERLAP_MM, 0.0)
     rise = axes @ base.frame[1]
     foot = start + (inside - start[0]) / rise[0] * rise
     end = start + min(REACH_MM, plate.high) * rise
@@ -212,15 +195,15 @@ def _flange(
 def _zero_holes(base: BaseLayout, plate: HeadPlate) -> list[Primitive]:
     """Hole of the zero pin and mark beside it; inserts for the bracket of the switch."""
     spec, through = base.spec, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
-    pin = hub_point(base, plate.back - THROUGH_MM, PIN_OUT_MM)
-    mark = np.array([plate.front - MARK_DEPTH_MM, PIN_OUT_MM, -MARK_MM / 2])
-    end = np.array([plate.front + THROUGH_MM, MARK_END_MM, MARK_MM / 2])
+    pin = base.point(plate.back - THROUGH_MM, PIN_OUT_MM)
+    mark = plate.front - MARK_DEPTH_MM, PIN_OUT_MM, -MARK_MM / 2
+    end = plate.front + THROUGH_MM, MARK_END_MM, MARK_MM / 2
     holes: list[Primitive] = [cylinder_between(pin, pin + through, PIN_HOLE_MM / 2)]
     holes.append(box(mark, end, base.frame))
     middle, deep = plate.front - PLATE_MM / 2, plate.half_width - spec.insert_depth_mm
     for out in bracket_screws():
-        inner = hub_point(base, middle, out, deep)
-        outer = hub_point(base, middle, out, plate.half_width + THROUGH_MM)
+        inner = base.point(middle, out, deep)
+        outer = base.point(middle, out, plate.half_width + THROUGH_MM)
         holes.append(cylinder_between(inner, outer, spec.insert_hole_mm / 2))
     return holes
 
@@ -233,21 +216,20 @@ def _seats(
     rear, seat = shaft_parts.rear, (outer + spec.bearing_fit_mm) / 2
     beyond = rear - 2 * shaft_parts.tube
     return [
-        axial_cylinder(base, plate.front + THROUGH_MM, plate.front - width, seat),
-        axial_cylinder(base, plate.front, beyond, outer / 2 - SHOULDER_MM),
-        axial_cylinder(base, rear + width, rear - THROUGH_MM, seat),
+        base.cylinder(plate.front + THROUGH_MM, plate.front - width, seat),
+        base.cylinder(plate.front, beyond, outer / 2 - SHOULDER_MM),
+        base.cylinder(rear + width, rear - THROUGH_MM, seat),
         # The flange may reach beyond the tube: the bearing goes through it without being pressed.
-        axial_cylinder(base, rear, beyond, outer / 2 + RELIEF_MM),
+        base.cylinder(rear, beyond, outer / 2 + RELIEF_MM),
     ]
 
 
-def _motor_holes(
-    spec: FrameSpec, base: BaseLayout, drive: Drive, plate: HeadPlate
-) -> list[Primitive]:
+def _motor_holes(site: Site, plate: HeadPlate) -> list[Primitive]:
     """Pilot and screws: slots along the plate for a belt, a window for a motor on the axis."""
+    spec, base, drive = site.spec.prototype.frame, site.base, site.drive
     motor, depth = drive.motor, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
     start = plate.back - THROUGH_MM
-    places = [hub_point(base, start, out, side) for out, side in motor_screw_places(drive)]
+    places = [base.point(start, out, side) for out, side in motor_screw_places(drive)]
     if motor.kind == "stages":
         # Screws go in from behind, where flange and webs are.
         behind = (KEY_ROOM_MM + THROUGH_MM) * base.frame[0]
@@ -257,11 +239,29 @@ def _motor_holes(
         return [*through, *(cylinder_between(at - behind, at, access) for at in to_heads)]
     travel = spec.belt_travel_mm if drive.belt else 0.0
     pilot, screw = motor["pilot_mm"] / 2 + PILOT_PLAY_MM, CLEARANCE_HOLE_MM[motor["thread_mm"]] / 2
-    middle = hub_point(base, start, drive.centre_mm)
+    middle = base.point(start, drive.centre_mm)
     holes = [slot(middle, base.frame[1], travel, pilot, depth)]
     holes += [slot(place, base.frame[1], travel, screw, depth) for place in places]
     if not drive.belt:
         size = motor["frame_mm"] / 2 + WINDOW_PLAY_MM
-        low = np.array([plate.back - motor["length_mm"] - WINDOW_BEYOND_MM, -size, -size])
-        holes.append(box(low, np.array([plate.back, size, size]), base.frame))
+        low = plate.back - motor["length_mm"] - WINDOW_BEYOND_MM, -size, -size
+        holes.append(box(low, (plate.back, size, size), base.frame))
     return holes
+
+
+@planned("Bearing head on the uprights", "bearing_*")
+def head_step(machine: AssembledMachine) -> Words:
+    """Bearings and head."""
+    bearings = machine.has("bearing_front")
+    seat = "Press a bearing into either side of the head, until it sits on its shoulder."
+    turns = "The shaft slides through both bearings by hand and turns without a rough spot."
+    does = [
+        "Press the inserts into the head's side.",
+        when(bearings, seat),
+        "Screw the head on the uprights with the T-nuts, its upper edge flush with their ends.",
+    ]
+    checks = ["A straight edge across both uprights' ends touches the head.", when(bearings, turns)]
+    return does, checks
+
+
+HEAD = Part((head_step,), bearing_head)

@@ -9,17 +9,17 @@ from tbcad.core.geometry.primitives import Component, Primitive, Prism, box
 from tbcad.core.geometry.rotations import even_angles, unit_circle
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
-from tbcad.core.spec.prototype import FrameSpec, StageSpec
-from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.purchased import (
+from tbcad.core.spec.prototype import PrototypeSpec, StageSpec
+from tbcad.prototype.frame.shared import (
     CLEARANCE_HOLE_MM,
     EXTRUSION_MM,
     THROUGH_MM,
-    Bracket,
     drilled_holes,
+    on_uprights,
 )
 from tbcad.prototype.keepout import KeepOut
-from tbcad.prototype.purchased.parts import PurchasedPart
+from tbcad.prototype.part import Bracket, Mounted
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.types import Floats
 
 STRIP, SHORT_STRIP = "STRIP-COB-24V", "STRIP-240-24V"
@@ -39,11 +39,13 @@ TAIL_MM = 34.0  # of a holder on an upright below the strips, for its two screws
 TAIL_SCREWS_MM = (9.0, 25.0)  # below the strips
 SCREW_MM = 5.0  # thread
 LEVEL, ACROSS, UP = np.eye(3)
+SIGNS = np.array([[1.0, 1, 1], [1, -1, 1], [-1, 1, 1], [-1, -1, 1]])  # lamp 1 and its images
+HALF_TURN = np.array([[1.0, 1, 1], [-1, -1, 1]])  # of two lamps
 
 
-@dataclass(frozen=True)
-class LampLayout:
-    """The lamps, in the frame of the shell."""
+@dataclass(frozen=True, kw_only=True)
+class LampLayout(Mounted):
+    """The lamps: strips as purchased bodies, stands as brackets, holders on the uprights."""
 
     strip: PurchasedPart  # that they are made of, from the lists
     strips: int  # number of strips on each, side by side
@@ -51,12 +53,8 @@ class LampLayout:
     level: bool  # whether strips lie level, along y; else they are upright
     places: Floats  # middles of the shining faces, mm, (l, 3)
     inward: Floats  # unit directions that they shine in, (l, 3)
-    stands: tuple[Bracket, ...]  # on the base plate, to print
-    holders: tuple[Component, ...]  # on the uprights, to print
     # heights (z) of the holders' screws on each upright, the upper first, mm
     screws: tuple[float, ...]
-    fasteners: tuple[Fastener, ...]  # that hold the holders
-    bodies: tuple[Component, ...]  # of the strips of each lamp
 
     @property
     def width(self) -> float:
@@ -152,14 +150,30 @@ def _reaches(keep_out: KeepOut, starts: Floats, ends: Floats) -> bool:
 
 
 @dataclass(frozen=True)
-class LampMounts:
-    """Builds what holds a lamp."""
+class Lamps:
+    """Four upright lamps, or two level ones beside the plane y = 0, at any height."""
 
-    frame: FrameSpec  # section of the frame
-    strip: PurchasedPart  # part
+    spec: PrototypeSpec  # of the prototype
+    parts: Parts  # lists of purchased parts
     face: float  # x of the uprights' front, mm
-    sides: tuple[float, float]  # of a shining face, along y and along z, mm
-    level: bool  # whether strips lie level, else they are upright
+    strip: PurchasedPart  # part
+    aside: float | None  # y of level lamps, mm; None: they are upright
+
+    @property
+    def level(self) -> bool:
+        """Whether strips lie level, along y; else they are upright."""
+        return self.aside is not None
+
+    @property
+    def length(self) -> float:
+        """Of a strip, mm."""
+        return self.spec.light.segments * self.strip["cut_mm"]
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Of a shining face, along y and along z, mm."""
+        width = self.spec.light.strips * self.strip["width_mm"]
+        return (self.length, width) if self.level else (width, self.length)
 
     @property
     def half(self) -> float:
@@ -174,7 +188,7 @@ class LampMounts:
     @property
     def across(self) -> float:
         """Y of the uprights' middles."""
-        return self.frame.uprights_mm / 2
+        return self.spec.frame.uprights_mm / 2
 
     @property
     def column(self) -> float:
@@ -208,7 +222,7 @@ class LampMounts:
             what, sides = f"stand of lamp {number}", [side]
             y = np.sort(side * np.array([end - self.half, end + self.half]))
         x = float(place[0]) + self.strip["thickness_mm"] + COLUMN_MM / 2
-        floor, flange = self.frame.floor_mm, self.frame.flange_mm
+        floor, flange = self.spec.frame.floor_mm, self.spec.frame.flange_mm
         feet, holes, added = list[Floats](), list[Floats](), list[Primitive]()
         half, beside = np.array([COLUMN_MM / 2, FOOT_IN_MM]), np.array([[-1, 0], [1, 0]])
         for side in sides:
@@ -217,7 +231,7 @@ class LampMounts:
             foot = np.array([[x - FOOT_HALF_MM, out[0]], [x + FOOT_HALF_MM, out[1]]])
             column = (middle - half, middle + half)
             for (low, high), top in ((foot, floor + flange), (column, heights[1])):
-                added.append(box(np.array([*low, floor]), np.array([*high, top]), np.eye(3)))
+                added.append(box((*low, floor), (*high, top)))
             feet.append(foot)
             holes.append(middle + SCREW_SIDE_MM * beside + [0.0, side * SCREW_OUT_MM])
         places = np.vstack(holes)
@@ -238,7 +252,45 @@ class LampMounts:
         y, z = place[1] + np.array([-half_y, half_y]), place[2] + np.array([-half_z, half_z])
         low, high = np.array([x, y, z]).T
         what = f"{self.strip.what}, cut to {cut}"
-        return Component(f"lamp_{number}", what, (box(low, high, np.eye(3)),), part=self.strip.name)
+        return Component(f"lamp_{number}", what, (box(low, high),), part=self.strip.name)
+
+    def places(self, z: float) -> Floats:
+        """Middles of the shining faces (l, 3), at a height."""
+        x = -self.face - HOLDER_MM - self.strip["thickness_mm"]
+        if self.aside is not None:
+            return np.asarray(HALF_TURN * [x, self.aside, z]) + 0.0
+        return np.asarray(SIGNS * [x, self.across + OUT_MM, z])
+
+    def layout(self, z: float) -> LampLayout:
+        """The lamps at a height."""
+        places = self.places(z)
+        numbered = list(enumerate(places, 1))
+        before = [one for one in numbered if one[1][0] > 0]
+        behind = [one for one in numbered if one[1][0] < 0]
+        strips = self.spec.light.strips
+        return LampLayout(
+            brackets=tuple(self.stand(number, place) for number, place in before),
+            printed=tuple(self.holder(number, place) for number, place in behind),
+            purchased=tuple(
+                self.strips(number, place, f"{strips} of {self.length:g} mm")
+                for number, place in numbered
+            ),
+            fasteners=tuple(
+                fastener
+                for number, place in behind
+                for fastener in on_uprights(
+                    f"lamp_holder_{number}", self.screws(place), -LEVEL, HOLDER_MM, self.parts
+                )
+            ),
+            listed={self.strip.name: math.ceil(len(places) * strips * self.length / 1e3)},
+            strip=self.strip,
+            strips=strips,
+            length=self.length,
+            level=self.level,
+            places=places,
+            inward=-np.sign(places[:, :1]) * LEVEL,
+            screws=tuple(dict.fromkeys(float(at[2]) for at in self.screws(behind[0][1]))),
+        )
 
     def _heights(self, place: Floats, below: float) -> tuple[float, float]:
         """Of a plate: alike about level strips, else so far below upright ones."""
@@ -251,4 +303,4 @@ class LampMounts:
         """The plate behind the strips, between two places across and two heights."""
         near = abs(float(place[0])) + self.strip["thickness_mm"]
         x = np.sort(np.sign(place[0]) * np.array([near, near + HOLDER_MM]))
-        return box(np.array([x[0], y[0], z[0]]), np.array([x[1], y[1], z[1]]), np.eye(3))
+        return box((x[0], y[0], z[0]), (x[1], y[1], z[1]))

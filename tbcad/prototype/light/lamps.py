@@ -6,194 +6,140 @@ and on a bridge over the camera: decision 0014.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
+from tbcad.cad.drafting.dimensions import upward
+from tbcad.cad.drafting.sheet import (
+    A4,
+    BESIDE_MM,
+    Sheet,
+    drawing_room,
+    notes,
+    placed,
+    rectangle,
+    sheet_frame,
+)
+from tbcad.cad.formats.entities import Layer, Line
 from tbcad.core.geometry.primitives import Component, Primitive, enclosing_triangles
-from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.core.spec.section import AUTO
-from tbcad.prototype.frame.purchased import on_uprights
-from tbcad.prototype.keepout import KeepOut, min_distance
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.files.bom import PartsList
+from tbcad.prototype.frame.shared import EXTRUSION_MM, BearingHead
+from tbcad.prototype.keepout import min_distance
 from tbcad.prototype.light.lamp import (
-    HOLDER_MM,
-    OUT_MM,
+    EDGE_MM,
     SHORT_STRIP,
     STRIP,
     TAIL_MM,
     LampLayout,
-    LampMounts,
+    Lamps,
     hidden_by_base,
     in_view,
 )
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.prototype.part import FrameLayout, Part, Site
+from tbcad.prototype.sheets import fitted, outer, title_block
 from tbcad.types import Floats
 
-SIGNS = np.array([[1.0, 1, 1], [1, -1, 1], [-1, 1, 1], [-1, -1, 1]])  # lamp 1 and its images
-HALF_TURN = np.array([[1.0, 1, 1], [-1, -1, 1]])  # of two lamps
 # By how much level lamps are beside the plane y = 0: where the base hides one side, the other.
 ASIDE_MM = (0.0, -5.0, 5.0, -10.0, 10.0, -15.0, 15.0)
 FOOT_HEIGHT_MM = 50.0  # of the uprights' feet, which holders stay above
 HEAD_MM = 8.5  # of a holder's screw, which strips keep clear of
-BESIDE_MM = 1.0  # of level lamps and what holds them from other static parts
+OFF_PARTS_MM = 1.0  # of level lamps and what holds them from other static parts
 STEP_MM = 2.5  # between heights that are tried
 MAX_MA = 1000.0  # half of the supply's; the other half is the motor's
-LEVEL = np.array([1.0, 0.0, 0.0])
+LAMP = "drawing_lamp"
+STRIP_CUT_MM = 0.5  # tolerance of a cut at its mark, to either side
+BESIDE_STRIPS_MM = 8.0  # of dimension lines from the strips
 
 
-def lamp_layout(
-    spec: PrototypeSpec,
-    face: float,
-    camera: Camera,
-    keep_out: KeepOut,
-    parts: Parts,
-    beside: Sequence[Component] = (),
-) -> LampLayout | None:
+def lamp_layout(site: Site, before: FrameLayout) -> LampLayout | None:
     """The lamps of a prototype; None without any, also where "auto" finds no place for them.
 
-    The face is x of the uprights' front, mm. The camera must not see lamps or stands, and these
-    must not meet the static parts beside them.
+    The camera must not see lamps or stands, and these must not meet the static parts beside them.
 
     SpecError when lamps cannot be where the spec has them, or take too much current; it says what
     to change.
     """
+    spec, face = site.spec.prototype, before.of(BearingHead).face
+    strip, short = site.parts[STRIP], site.parts[SHORT_STRIP]
+    tries = (strip, None), *product((strip, short), ASIDE_MM)
+    found = [Lamps(spec, site.parts, face, *one) for one in tries]
+    search = _LampSearch(site, (*before.printed, *before.purchased))
     section = spec.light
-    strip, short = parts[STRIP], parts[SHORT_STRIP]
-    upright = _LampSearch(spec, face, camera, keep_out, beside, parts, strip, aside=None)
-    level = [replace(upright, strip=one, aside=at) for one in (strip, short) for at in ASIDE_MM]
-    found = [upright, *level]
     if (current := found[0].layout(-1.0).current_ma) > MAX_MA:
         raise SpecError(
             f"the lamps take {current:.0f} mA, more than the {MAX_MA:.0f} that the supply has "
             "left: make prototype.light.strips or segments smaller"
         )
     if section.lamp_z_mm == AUTO:
-        heights = ((places, places.highest()) for places in found)
-        return next((places.layout(z) for places, z in heights if z is not None), None)
+        heights = ((lamps, search.highest(lamps)) for lamps in found)
+        return next((lamps.layout(z) for lamps, z in heights if z is not None), None)
     z = float(section.lamp_z_mm)
     if z == 0:
         return None
-    fitting = next((places for places in found if not places.fault(z)), None)
+    fitting = next((lamps for lamps in found if not search.fault(lamps, z)), None)
     if fitting is None:
         raise SpecError(
-            f"prototype.light.lamp_z_mm {z:g}: {found[0].fault(z)}; of two level lamps, "
-            f"{found[1].fault(z)}: set it to auto, or to 0 for no lamps"
+            f"prototype.light.lamp_z_mm {z:g}: {search.fault(found[0], z)}; of two level lamps, "
+            f"{search.fault(found[1], z)}: set it to auto, or to 0 for no lamps"
         )
     return fitting.layout(z)
 
 
 @dataclass(frozen=True)
 class _LampSearch:
-    """Places of four upright lamps, or of two level ones beside the plane y = 0 (mm).
+    """Where lamps have room, beside static parts."""
 
-    What decides where lamps can be has the names of the arguments of `lamp_layout`.
-    """
+    site: Site
+    beside: tuple[Component, ...]
 
-    spec: PrototypeSpec
-    face: float
-    camera: Camera
-    keep_out: KeepOut
-    beside: Sequence[Component]
-    parts: Parts
-    strip: PurchasedPart
-    aside: float | None
-
-    @property
-    def level(self) -> bool:
-        return self.aside is not None
-
-    @property
-    def length(self) -> float:
-        """Of a strip, mm."""
-        return self.spec.light.segments * self.strip["cut_mm"]
-
-    @cached_property
-    def mounts(self) -> LampMounts:
-        width = self.spec.light.strips * self.strip["width_mm"]
-        sides = (self.length, width) if self.level else (width, self.length)
-        return LampMounts(self.spec.frame, self.strip, self.face, sides, self.level)
-
-    def places(self, z: float) -> Floats:
-        """Middles of the shining faces (l, 3), at a height."""
-        x = -self.face - HOLDER_MM - self.strip["thickness_mm"]
-        if self.aside is not None:
-            return np.asarray(HALF_TURN * [x, self.aside, z]) + 0.0
-        return np.asarray(SIGNS * [x, self.mounts.across + OUT_MM, z])
-
-    def highest(self) -> float | None:
+    def highest(self, lamps: Lamps) -> float | None:
         """The greatest height at which lamps have room, or None."""
         z = -STEP_MM
-        while self.fault(z):
+        while self.fault(lamps, z):
             z -= STEP_MM
-            if self._lowest(z) < self.spec.frame.floor_mm:
+            if _lowest(lamps, z) < lamps.spec.frame.floor_mm:
                 return None
         return z
 
-    def _lowest(self, z: float) -> float:
-        """Lower end of what is on the uprights."""
-        if self.level:
-            return z - self.mounts.half_height
-        return z - self.length / 2 - TAIL_MM
-
-    def fault(self, z: float) -> str:
+    def fault(self, lamps: Lamps, z: float) -> str:
         """What is wrong with lamps at a height, or nothing."""
-        if self._lowest(z) < self.spec.frame.floor_mm + FOOT_HEIGHT_MM:
+        keep_out, need = self.site.keep_out, lamps.spec.frame.clearance_mm
+        if _lowest(lamps, z) < lamps.spec.frame.floor_mm + FOOT_HEIGHT_MM:
             return "the lamps reach down to the base plate"
         # How far level strips and a screw's head beside them reach from y = 0.
-        reach = abs(self.aside or 0.0) + (self.length + HEAD_MM) / 2
-        if self.level and reach > self.mounts.across:
+        reach = abs(lamps.aside or 0.0) + (lamps.length + HEAD_MM) / 2
+        if lamps.level and reach > lamps.across:
             return "the strips are longer than there is room between the uprights' screws"
-        layout = self.layout(z)
-        need, bodies = self.spec.frame.clearance_mm, _bodies(layout)
-        if in_view(bodies, self.camera):
+        layout = lamps.layout(z)
+        bodies = _bodies(layout)
+        if in_view(bodies, self.site.layout.array.camera):
             return "the camera sees a lamp or its stand"
-        if self.level and (name := _met(bodies, self.beside)):
+        if lamps.level and (name := _met(bodies, self.beside)):
             return f"a lamp or its holder meets the {name.replace('_', ' ')}"
         for what, distance in (
-            ("the light of the balls", self.keep_out.to_light),
-            ("what the base sweeps", self.keep_out.to_swept),
+            ("the light of the balls", keep_out.to_light),
+            ("what the base sweeps", keep_out.to_swept),
         ):
             if min_distance(distance, bodies, need) < need:
                 return f"a lamp or its holder is less than {need:g} mm from {what}"
-        hidden = hidden_by_base(layout, self.spec.stage, self.keep_out)
+        hidden = hidden_by_base(layout, lamps.spec.stage, keep_out)
         return "the base comes between a lamp and the object's room" if hidden else ""
 
-    def layout(self, z: float) -> LampLayout:
-        """The lamps at a height."""
-        mounts, places = self.mounts, self.places(z)
-        numbered = list(enumerate(places, 1))
-        before = [one for one in numbered if one[1][0] > 0]
-        behind = [one for one in numbered if one[1][0] < 0]
-        return LampLayout(
-            strip=self.strip,
-            strips=self.spec.light.strips,
-            length=self.length,
-            level=self.level,
-            places=places,
-            inward=-np.sign(places[:, :1]) * LEVEL,
-            stands=tuple(mounts.stand(number, place) for number, place in before),
-            holders=tuple(mounts.holder(number, place) for number, place in behind),
-            screws=tuple(dict.fromkeys(float(at[2]) for at in mounts.screws(behind[0][1]))),
-            fasteners=tuple(
-                fastener
-                for number, place in behind
-                for fastener in on_uprights(
-                    f"lamp_holder_{number}", mounts.screws(place), -LEVEL, HOLDER_MM, self.parts
-                )
-            ),
-            bodies=tuple(
-                mounts.strips(number, place, f"{self.spec.light.strips} of {self.length:g} mm")
-                for number, place in numbered
-            ),
-        )
+
+def _lowest(lamps: Lamps, z: float) -> float:
+    """Lower end of what is on the uprights."""
+    return z - (lamps.half_height if lamps.level else lamps.length / 2 + TAIL_MM)
 
 
 def _bodies(layout: LampLayout) -> list[Primitive]:
     """Bodies of lamps and of what holds them."""
-    parts = [*(stand.component for stand in layout.stands), *layout.holders, *layout.bodies]
+    stands = (stand.component for stand in layout.brackets)
+    parts = (*stands, *layout.printed, *layout.purchased)
     return [body for part in parts for body in part.added]
 
 
@@ -202,7 +148,8 @@ def _met(bodies: Sequence[Primitive], others: Sequence[Component]) -> str:
     own = [_box(body) for body in bodies]
     for other in others:
         for low, high in map(_box, other.added):
-            near = ((low - BESIDE_MM < top) & (bottom < high + BESIDE_MM) for bottom, top in own)
+            around = low - OFF_PARTS_MM, high + OFF_PARTS_MM
+            near = ((around[0] < top) & (bottom < around[1]) for bottom, top in own)
             if any(axes.all() for axes in near):
                 return other.name
     return ""
@@ -211,3 +158,93 @@ def _met(bodies: Sequence[Primitive], others: Sequence[Component]) -> str:
 def _box(body: Primitive) -> tuple[Floats, Floats]:
     points = enclosing_triangles(body).reshape(-1, 3)
     return points.min(axis=0), points.max(axis=0)
+
+
+@planned("Lamps", "lamp_*", loose=("strips",), near=("plate",))
+def lamps_step(machine: AssembledMachine) -> Words:
+    """Stands, holders and strips."""
+    light = machine.record.lamps
+    assert light is not None
+    drawing = machine.record.drawing_of(light.strip)
+    does = [
+        "Screw the bridge's feet on the plate with washers, on both sides of the camera's place; "
+        "the plate's drawing says which holes are theirs. Screw the bar on the fronts of both "
+        "uprights with its T-nuts, as high as the upright's drawing has it."
+        if light.level
+        else "Screw the stands on the plate with washers; its drawing says which holes are theirs. "
+        "Screw the holders on the fronts of the uprights with their T-nuts, as high as the "
+        "upright's drawing has it.",
+        f"Cut the strip {machine.ref(light.strip)} at its marks: {light.strips} pieces of "
+        f"{light.length_mm:.0f} mm for each of the {len(light.places)} lamps"
+        f"{when(drawing, f' ({drawing})')}. Solder a cable to each piece, plus to plus.",
+        "Stick them on the lamps' faces, toward the object.",
+    ]
+    checks = [
+        f"At 24 V all of them light up and draw {light.current_ma:.0f} mA together.",
+        "All of them shine at the object, and stand alike on both sides of it.",
+    ]
+    return does, checks
+
+
+def lamp_sheet(lamps: LampLayout, bill: PartsList) -> Sheet:
+    """The strips of a lamp side by side, lying; the origin is their lower left corner."""
+    part, paper = lamps.strip, A4
+    left, low, right, high = drawing_room(paper)
+    middle = low + (high - low) / 2
+    size, pieces = (lamps.length, lamps.width), lamps.strips * len(lamps.places)
+    scale, origin = fitted(size, (left, middle, right, high))
+    wide = part["width_mm"]
+    strips = [
+        rectangle((0.0, k * wide, lamps.length, (k + 1) * wide), Layer.CUT)
+        for k in range(lamps.strips)
+    ]
+    steps = part["cut_mm"] * np.arange(1, round(lamps.length / part["cut_mm"]))
+    uncut = [Line(Layer.CENTRE, (x, 0.0), (x, lamps.width)) for x in steps.tolist()]
+    drawn = placed([*strips, *uncut], origin, scale)
+    x, y = origin[0] + lamps.length * scale, origin[1]  # beside it, the width of a strip
+    of_one = upward((x, y), (x, y + wide * scale), x + BESIDE_STRIPS_MM, f"{wide:g}")
+    title = "strips of a lamp"
+    text = (
+        f"Cut {pieces} pieces of {lamps.length:g} \u00b1 {STRIP_CUT_MM:g}, {lamps.strips} for each "
+        f"of {len(lamps.places)} lamps, at marks every {part['cut_mm']:g}, through the copper "
+        "pads.",
+        _place_note(lamps),
+        "Solder a cable to the pads of one end, plus to plus, before sticking; insulate the pads.",
+        f"{part['supply_v']:g} V, {part['watt_m'] * lamps.length / part['supply_v']:.0f} "
+        "mA for each piece; all pieces in parallel.",
+    )
+    entities = [
+        *sheet_frame(paper, scale, title_block(bill, title, part, "on the shining face")),
+        *drawn,
+        *outer(origin, (size[0] * scale, size[1] * scale), size),
+        *([of_one] if lamps.strips > 1 else []),
+        *notes((left + BESIDE_MM, middle), right - left - 2 * BESIDE_MM, text),
+    ]
+    return Sheet(LAMP, title, part.name, paper, scale, origin, tuple(entities))
+
+
+def _place_note(lamps: LampLayout) -> str:
+    """Where the strips stick on the printed plates."""
+    if not lamps.level:
+        half = max(lamps.width / 2 + EDGE_MM, EXTRUSION_MM / 2)
+        return (
+            f"Stick them upright on the printed face, side by side, {EDGE_MM:g} below its upper "
+            f"end: in the middle of a stand, their middle {half:g} from the outer edge of a holder."
+        )
+    aside = abs(float(lamps.places[0, 1]))
+    middle = (
+        f"their middle {aside:g} beside the middle of bar and bridge, on opposite sides"
+        if aside
+        else "in the middle of bar and bridge"
+    )
+    return (
+        f"Stick them level on the printed face, one above the other, at half its height, {middle}."
+    )
+
+
+def _sheets(_: Site, frame: FrameLayout, bill: PartsList) -> tuple[Sheet, ...]:
+    lamps = frame.find(LampLayout)
+    return (lamp_sheet(lamps, bill),) if lamps else ()
+
+
+LAMPS = Part((lamps_step,), lamp_layout, _sheets)

@@ -16,7 +16,9 @@ from tbcad.core.geometry.rotations import even_angles, rotated, unit_circle
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import LightSpec
 from tbcad.core.spec.section import AUTO
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned
 from tbcad.prototype.keepout import KeepOut
+from tbcad.prototype.part import Part
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
 from tbcad.types import Floats
 
@@ -135,9 +137,8 @@ def _panels(low: Floats, high: Floats, sheet: PurchasedPart) -> tuple[Panel, ...
     back, front = (x0 - thick, x0), (x1, x1 + thick)
     right, left = (y0 - thick, y0), (y1, y1 + thick)
     middle, half = (y0 + y1) / 2, NOTCH_MM[0] / 2
-    start = np.array([back[0] - 1.0, middle - half, z0 - 1.0])
-    end = np.array([back[1] + 1.0, middle + half, z0 + NOTCH_MM[1]])
-    notch = (box(start, end, np.eye(3)),)
+    end = back[1] + 1.0, middle + half, z0 + NOTCH_MM[1]
+    notch = (box((back[0] - 1.0, middle - half, z0 - 1.0), end),)
     flaps = ("left", "right", "top")
     return (
         _panel("floor", "floor of the shroud below the plate", (out_x, out_y, (z0 - thick, z0))),
@@ -158,7 +159,7 @@ def _panel(
 ) -> Panel:
     """A panel that fills ranges of x, y and z."""
     low, high = np.array(ranges).T
-    component = Component(PREFIX + name, what, (box(low, high, np.eye(3)),), notch)
+    component = Component(PREFIX + name, what, (box(low, high),), notch)
     width, height = np.delete(high - low, np.argmin(high - low)).tolist()
     return Panel(component, (width, height), flaps, bool(notch))
 
@@ -208,3 +209,28 @@ def _swept(keep_out: KeepOut, section: Floats, first: float, last: float) -> Flo
     r = section[:, 1:] / np.cos(SWING_STEP_RAD / 2)
     upright = section[:, :1] * axis + r * zero
     return np.asarray(rotated(upright[:, None], axis, angle[None]).reshape(-1, 3))
+
+
+@planned("Shroud", "shroud_*", loose=("sheets",))
+def shroud_step(machine: AssembledMachine) -> Words:
+    """The box of card."""
+    box = machine.record.shroud
+    assert box is not None
+    does = [
+        *(
+            f"Cut {one.dxf}: {one.what}, {one.size_mm[0]:.0f} x {one.size_mm[1]:.0f} mm."
+            for one in box.panels
+        ),
+        "Lay the floor under the plate first; cables go out through the notch of the back.",
+        "Score the dashed lines. Fold the flaps of front, back and right side inward by 90 degrees "
+        "and glue them. The left side is held by tape, so that it comes off: the object is placed "
+        "and turned through it.",
+    ]
+    checks = [
+        "No part touches the card over the whole travel of the base.",
+        "With the room lit and the lamps off, a long exposure stays black.",
+    ]
+    return does, checks
+
+
+SHROUD = Part((shroud_step,))

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -15,38 +16,13 @@ from tbcad.core.spec.csv_rows import Row, check_unique, positive_number, read_ro
 from tbcad.core.spec.errors import SpecError, short_text
 
 COMMON_COLUMNS = ("part", "what", "material", "mass_g")
-SIZES: dict[str, tuple[str, ...]] = {
-    "motors": (
-        *("frame_mm", "length_mm", "shaft_mm", "shaft_length_mm", "pilot_mm", "pilot_height_mm"),
-        *("hole_square_mm", "thread_mm", "holding_nmm", "full_steps"),
-        *("rated_a", "resistance_ohm", "radial_n"),
-    ),
-    "stages": ("top_mm", "hole_circle_mm", "hole_mm", "ratio", "holding_nmm", "full_steps"),
-    "wheels": ("teeth", "pitch_mm", "width_mm", "bore_mm"),
-    "belts": ("teeth", "pitch_mm", "width_mm", "rating_n", "stiffness_n"),
-    "couplings": ("bore_mm", "flange_mm", "hole_circle_mm", "hole_mm"),
-    "shafts": ("diameter_mm", "length_mm"),
-    "bearings": ("bore_mm", "outer_mm", "width_mm", "load_n"),
-    "screws": ("thread_mm", "length_mm", "head_mm", "head_height_mm"),
-    "setscrews": ("thread_mm", "length_mm"),
-    "inserts": ("thread_mm", "length_mm", "outer_mm", "hole_mm"),
-    "dowels": ("diameter_mm", "length_mm"),
-    "magnets": ("diameter_mm", "height_mm"),
-    "leds": ("diameter_mm", "flange_mm", "height_mm", "forward_v", "max_ma"),
-    "strips": ("width_mm", "thickness_mm", "cut_mm", "supply_v", "watt_m", "lumen_m"),
-    "sheets": ("length_mm", "width_mm", "thickness_mm"),
-    "resistors": ("power_w",),
-    "wires": ("outer_mm", "max_ma"),
-    "connectors": ("pins",),
-    "electronics": (),
-    "extrusions": ("side_mm", "slot_mm", "length_mm"),
-    "tnuts": ("thread_mm", "slot_mm"),
-    "nuts": ("thread_mm", "width_mm", "height_mm"),
-    "washers": ("thread_mm", "outer_mm", "thickness_mm"),
-    "collars": ("bore_mm", "outer_mm", "width_mm"),
-    "plates": ("length_mm", "width_mm", "thickness_mm"),
-}
-"""Columns that describe each kind of part, all above zero.
+KINDS = (
+    *("motors", "stages", "wheels", "belts", "couplings", "shafts", "bearings", "screws"),
+    *("setscrews", "inserts", "dowels", "magnets", "leds", "strips", "sheets", "resistors"),
+    *("wires", "connectors", "electronics", "extrusions", "tnuts", "nuts", "washers"),
+    *("collars", "plates"),
+)
+"""Lists of parts, in the order in which they are listed. Their own columns are sizes above zero.
 
 shaft_length_mm is the length of a motor's shaft from the face that its screws pull on the plate.
 radial_n is the load at the end of a motor's shaft that its bearings bear for 30,000 h.
@@ -67,17 +43,17 @@ WEIGHED_DIGITS = 2  # a price by mass is an estimate whatever the list says
 class PurchasedPart:
     """A purchased part."""
 
-    kind: str  # its list, a key of SIZES
+    kind: str  # its list, one of KINDS
     name: str  # unique in all lists
     what: str  # description with standard
     material: str  # of it
     mass_g: float  # grams
-    sizes: tuple[float, ...]  # numbers in the order of SIZES, units in their names
+    sizes: tuple[float, ...]  # numbers in the order of its list's columns, units in their names
     source: str  # where they come from
 
     def __getitem__(self, size: str) -> float:
-        """One of the sizes, by its name in SIZES."""
-        return self.sizes[SIZES[self.kind].index(size)]
+        """One of the sizes, by the name of its column."""
+        return self.sizes[sizes_of(self.kind).index(size)]
 
 
 Parts = dict[str, PurchasedPart]
@@ -89,15 +65,22 @@ def package_lists() -> Traversable:
     return files("tbcad.prototype.purchased")
 
 
+@cache
+def sizes_of(kind: str) -> tuple[str, ...]:
+    """Columns that describe a kind of part, by the header of tbcad's own list."""
+    header = (package_lists() / f"{kind}.csv").read_text(encoding="utf-8").partition("\n")[0]
+    return tuple(one for one in header.split(",") if one not in (*COMMON_COLUMNS, "source"))
+
+
 def load_parts(folder: Traversable | None = None) -> Parts:
     """All purchased parts by name, from a folder with a CSV file for each kind, or tbcad's own.
 
     SpecError when a file is wrong; it names line and column.
     """
     folder, names, parts = folder or package_lists(), set[str](), []
-    for kind, sizes in SIZES.items():
-        name = f"{kind}.csv"
-        for where, row in read_rows(folder / name, name, (*COMMON_COLUMNS, *sizes, "source")):
+    for kind in KINDS:
+        name, columns = f"{kind}.csv", (*COMMON_COLUMNS, *sizes_of(kind), "source")
+        for where, row in read_rows(folder / name, name, columns):
             check_unique(where, row, "part", names)
             parts.append(_part(where, kind, row))
     return {part.name: part for part in parts}
@@ -108,7 +91,7 @@ def _part(where: str, kind: str, row: Row) -> PurchasedPart:
         required_text(where, row, column) for column in ("part", "what", "material", "source")
     )
     mass, *sizes = (
-        positive_number(where, row, column, MAX_VALUE) for column in ("mass_g", *SIZES[kind])
+        positive_number(where, row, column, MAX_VALUE) for column in ("mass_g", *sizes_of(kind))
     )
     return PurchasedPart(kind, name, what, material, mass, tuple(sizes), source)
 

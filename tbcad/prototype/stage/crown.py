@@ -117,8 +117,7 @@ class Arm:
         return Prism(corners, 2 * half * self.axes[1])
 
     def _box(self, low: tuple[float, float], high: tuple[float, float], half: float) -> Prism:
-        first, last = (np.array([r, side, z]) for (r, z), side in ((low, -half), (high, half)))
-        return box(first, last, self.axes)
+        return box((low[0], -half, low[1]), (high[0], half, high[1]), self.axes)
 
 
 def arm_axes(dome: Floats) -> Floats:
@@ -203,11 +202,10 @@ def _pocket(
     low, bottom = np.array([*dome[:2], groove]), np.array([*dome[:2], floor])
     length = arm.root[0] if arm else float(norm(dome[:2]))
     way = cylinder_between(low, bottom + THROUGH_MM * UP, half)
-    end = np.array([length, half, plate + OPEN_MM])
     return [
         cylinder_between(bottom, np.array([*dome[:2], rim + THROUGH_MM]), radius),
         *(arm.grooves(stage.wire_mm) if arm else [way]),
-        box(np.array([0.0, -half, groove]), end, arm_axes(dome)),
+        box((0.0, -half, groove), (length, half, plate + OPEN_MM), arm_axes(dome)),
     ]
 
 

@@ -11,18 +11,13 @@ from typing import Any
 import pytest
 
 from tbcad.app.cli import run
-from tbcad.cad.formats.checked_files import write_table
+from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.errors import InputError
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_record, record
-from tbcad.prototype.electronics import COLUMNS as WIRING
 from tbcad.prototype.files.bom import COLUMNS
-from tbcad.records.tables import BallRow
-from tests.prototype_records import (
-    drive_section,
-    printed_part,
-    prototype_document,
-)
+from tbcad.records.tables import BallRow, WiringRow
+from tests.prototype_records import drive_section, printed_part, prototype_document
 
 Record = dict[str, Any]
 PRINTED = ("carrier", "zero_disc", "bearing_head", "stage_foot", "coupon_1")
@@ -85,10 +80,8 @@ def write(folder: Path, design: Record, more: dict[str, int]) -> Path:
             table.writerow(row)
     ball = dict.fromkeys(BallRow.columns(), 1) | {"kind": "ball", "size": "10 mm"}
     write_table(folder / "balls.csv", BallRow.columns(), [ball])
-    with (folder / "wiring.csv").open("w", newline="") as file:
-        lines = csv.DictWriter(file, WIRING, lineterminator="\n")
-        lines.writeheader()
-        lines.writerow({"line": 1, "signal": "lamp", "part": "lamp", "output": "digital 0"})
+    line: Row = {"line": 1, "signal": "lamp", "part": "lamp", "output": "digital 0"}
+    write_table(folder / WiringRow.FILE, WiringRow.columns(), [line])
     (folder / "prototype.json").write_text(json.dumps(design))
     return folder
 
@@ -112,7 +105,7 @@ def taken(steps: tuple[Step, ...]) -> Counter[str]:
 def test_steps_take_exactly_the_parts_of_the_list(machine: AssembledMachine) -> None:
     """And mount each body and fastener once; a fastener waits for the last that it goes through."""
     steps, recorded = assembly_steps(machine), mounting_record(machine)
-    assert taken(steps) == Counter(machine.quantities)
+    assert taken(steps) == Counter(machine.bill.quantities)
     assert [step.number for step in steps] == [*range(1, len(steps) + 1)]
     assert all(step.does and step.checks for step in steps)
     mounted = [name for step in recorded for name in step.mounts]
@@ -183,7 +176,7 @@ def test_other_designs_have_steps_of_their_own(
         del more["GT2-240-6"]
     machine = read_machine(write(tmp_path, design, more))
     steps = assembly_steps(machine)
-    assert taken(steps) == Counter(machine.quantities)
+    assert taken(steps) == Counter(machine.bill.quantities)
     assert all(step.does and step.checks for step in steps)
     assert "SET-M3x12" in {use.part for use in of(steps, locked).parts}
     joints = {use.part for use in of(steps, "carrier").parts} & {"DOWEL-4x16", "M3x12"}

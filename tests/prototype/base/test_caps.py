@@ -11,9 +11,8 @@ from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.balls.selection import ball_candidates
-from tbcad.prototype.base.caps import SHARES, cap_limits
+from tbcad.prototype.base.caps import SHARES, cap_limits, cap_sheet
 from tbcad.prototype.base.layout import base_layout
-from tbcad.prototype.drawings.caps import cap_sheet
 
 CAPTURE_MM = 60.0
 

@@ -13,13 +13,11 @@ from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.caps import holding
 from tbcad.prototype.base.holding import (
-    AT_DEFAULT_SPEED,
     DERATING,
     MIN_RATIO,
     MU_0,
     REMANENCE_T,
     Motion,
-    base_motion,
     force_needed,
     pad_normals,
     pull_of_pair,
@@ -93,10 +91,6 @@ def frame_about(axis: np.ndarray) -> np.ndarray:
     return np.stack([along, across, np.cross(along, across)])
 
 
-def test_the_default_motion_is_that_of_the_defaults() -> None:
-    assert base_motion(load_spec(None)) == AT_DEFAULT_SPEED
-
-
 class TestForceNeeded:
     def test_on_a_vertical_axis_it_is_the_weight_upside_down_and_none_on_its_back(self) -> None:
         """Gravity never turns."""
@@ -129,10 +123,8 @@ class TestForceNeeded:
         assert 0 <= least < 1e-4 * needed[0]
 
 
-def held(
-    spec: BaseSpec, prototype: PrototypeLayout, motion: Motion = AT_DEFAULT_SPEED
-) -> tuple[HeldBall, ...]:
-    return holding(base_layout(spec, prototype), prototype, motion, load_parts()).balls
+def held(spec: BaseSpec, prototype: PrototypeLayout) -> tuple[HeldBall, ...]:
+    return holding(base_layout(spec, prototype), prototype, load_parts()).balls
 
 
 class TestMagnets:
@@ -155,8 +147,10 @@ class TestMagnets:
             base_layout(weak, paper_prototype)
 
     def test_a_quick_base_needs_more_and_glue_holds(self, small_prototype: PrototypeLayout) -> None:
-        quick = replace(AT_DEFAULT_SPEED, acceleration=50.0)
-        rows = (held(BaseSpec(), small_prototype, motion) for motion in (quick, AT_DEFAULT_SPEED))
+        quick = load_spec(None, ["n=6", "prototype.k=4", "acceleration_deg_s2=2000"])
+        base = base_layout(BaseSpec(), small_prototype)
+        some = (replace(small_prototype, spec=quick), small_prototype)
+        rows = (holding(base, one, load_parts()).balls for one in some)
         for more, less in zip(*rows, strict=True):
             assert more.force_needed_n > less.force_needed_n
         for one in held(BaseSpec(hold="glue"), small_prototype):

@@ -33,12 +33,7 @@ from tbcad.prototype.base.coupon_seats import (
 from tbcad.prototype.base.hub import KEY_DEPTH_MM, KEY_HOLE_MM, hub_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.base.seat_solids import cap_parts
-from tbcad.prototype.base.solid import (
-    carrier_parts,
-    hub_bodies,
-    hub_holes,
-    removed_solids,
-)
+from tbcad.prototype.base.solid import carrier_parts, hub_bodies, hub_holes, removed_solids
 from tbcad.prototype.base.split import UNCUT, downward_directions, split_base
 from tbcad.prototype.print_bed import usable_size
 from tbcad.prototype.printed import PlacedSolid, placed_on_bed

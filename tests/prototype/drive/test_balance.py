@@ -7,13 +7,7 @@ from scipy.spatial.transform import Rotation
 from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.drive.balance import (
-    GRAVITY,
-    PointMasses,
-    ball_masses,
-    cap_volume,
-    sum_masses,
-)
+from tbcad.prototype.drive.balance import GRAVITY, PointMasses, ball_masses, cap_volume, sum_masses
 from tbcad.prototype.drive.drive import base_torques
 
 # The paper's: w leans 45 degrees below the horizon.

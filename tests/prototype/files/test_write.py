@@ -39,7 +39,7 @@ def test_steps_of_assembly_take_exactly_the_list_of_parts(folder: Path) -> None:
     sums = Counter[str]()
     for step in assembly_steps(machine):
         sums.update({use.part: use.quantity for use in step.parts})
-    assert sums == Counter(machine.quantities)
+    assert sums == Counter(machine.bill.quantities)
 
 
 def test_all_files_are_there(folder: Path, record: dict[str, Any]) -> None:

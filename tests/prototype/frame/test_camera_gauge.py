@@ -1,6 +1,7 @@
 """The gauge for the camera's place: its pictures, and how well they tell the pinhole's place."""
 
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -10,18 +11,17 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.frame.camera_gauge import CameraGauge, camera_gauge, marks_seen
+from tbcad.prototype.frame import camera_gauge
+from tbcad.prototype.frame.camera_gauge import CameraGauge, marks_seen
+from tbcad.prototype.part import FrameLayout, Site
 from tests.prototype.conftest import CAPTURE_RADIUS
 
-DIAMETER_MM = 60.0
 TRIALS = 20_000
 
 
 @pytest.fixture(scope="module")
-def gauge(small_prototype: PrototypeLayout, carrier: BaseLayout) -> CameraGauge:
-    array, swing = small_prototype.array, small_prototype.stops.range
-    needed = camera_requirements(array, CAPTURE_RADIUS)
-    return camera_gauge(carrier, array.camera, DIAMETER_MM, needed, swing)
+def gauge(frame: FrameLayout) -> CameraGauge:
+    return frame.of(CameraGauge)
 
 
 @pytest.fixture(scope="module")
@@ -61,13 +61,17 @@ def test_the_pinhole_found_is_as_near_as_stated(gauge: CameraGauge, camera: Came
 
 
 def test_a_wider_pupil_and_a_larger_lens_tell_less(
-    gauge: CameraGauge, small_prototype: PrototypeLayout, carrier: BaseLayout
+    gauge: CameraGauge, site: Site, frame: FrameLayout
 ) -> None:
-    array, swing = small_prototype.array, small_prototype.stops.range
-    needed = camera_requirements(array, CAPTURE_RADIUS)
+    needed = camera_requirements(site.layout.array, CAPTURE_RADIUS)
     wide = replace(needed, pupil_mm=4 * needed.pupil_mm)
-    worse = camera_gauge(carrier, array.camera, DIAMETER_MM, wide, swing)
+    with mock.patch.object(camera_gauge, "camera_requirements", return_value=wide):
+        worse = camera_gauge.camera_gauge(site, frame)
+    assert worse
     assert all(worse.errors[name] > value for name, value in gauge.errors.items())
-    large = camera_gauge(carrier, array.camera, 2 * DIAMETER_MM, needed, swing)
+    prototype = site.spec.prototype.model_copy(update={"camera_diameter_mm": 120.0})
+    spec = site.spec.model_copy(update={"prototype": prototype})
+    large = camera_gauge.camera_gauge(replace(site, spec=spec), frame)
+    assert large
     assert large.sizes.near < gauge.sizes.near
     assert large.errors["along_mm"] > gauge.errors["along_mm"]

@@ -7,8 +7,9 @@ from OCP.TopoDS import TopoDS_Shape
 from tbcad.cad.kernel.checks import volume
 from tbcad.core.geometry.vectors import norm
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.frame.layout import SLOT_DEPTH_MM, FrameLayout
-from tbcad.prototype.frame.purchased import CLEARANCE_HOLE_MM
+from tbcad.prototype.frame.shared import CLEARANCE_HOLE_MM, BearingHead
+from tbcad.prototype.frame.stock import SLOT_DEPTH_MM, Stock
+from tbcad.prototype.part import FrameLayout
 from tbcad.prototype.printed import component_solid
 from tests.helpers import cylinders
 from tests.prototype.conftest import SMALL
@@ -23,13 +24,10 @@ def purchased(frame: FrameLayout) -> dict[str, TopoDS_Shape]:
 
 class TestSolids:
     def test_bearing_seats_and_bearings_are_on_the_axis(
-        self,
-        carrier: BaseLayout,
-        frame: FrameLayout,
-        purchased: dict[str, TopoDS_Shape],
+        self, carrier: BaseLayout, frame: FrameLayout, purchased: dict[str, TopoDS_Shape]
     ) -> None:
         w, seat = carrier.frame[0], (22 + FRAME.bearing_fit_mm) / 2
-        head = cylinders(component_solid(frame.head.component))
+        head = cylinders(component_solid(frame.of(BearingHead).printed[0]))
         seats = [one for one in head if abs(one[2] - seat) < 1e-9]
         assert len(seats) >= 2
         rings = [*cylinders(purchased["bearing_front"]), *cylinders(purchased["bearing_rear"])]
@@ -41,16 +39,17 @@ class TestSolids:
     def test_bought_bodies_have_their_volumes(
         self, purchased: dict[str, TopoDS_Shape], frame: FrameLayout
     ) -> None:
-        assert frame.head.shaft
-        shaft = np.pi * 4**2 * frame.head.shaft["length_mm"]
+        bar_of_shaft, stock = frame.of(BearingHead).shaft, frame.of(Stock)
+        assert bar_of_shaft
+        shaft = np.pi * 4**2 * bar_of_shaft["length_mm"]
         ring = np.pi * (11**2 - 4**2) * 7
         assert volume(purchased["shaft"]) == pytest.approx(shaft, rel=1e-9)
         assert volume(purchased["bearing_front"]) == pytest.approx(ring, rel=1e-9)
-        slots = 4 * frame.upright["slot_mm"] * SLOT_DEPTH_MM
-        bar = (20 * 20 - slots) * frame.length
+        slots = 4 * stock.upright["slot_mm"] * SLOT_DEPTH_MM
+        bar = (20 * 20 - slots) * stock.length
         assert volume(purchased["upright_left"]) == pytest.approx(bar, rel=1e-9)
         radii = {round(radius, 6) for _, _, radius in cylinders(purchased["wheel"])}
         assert CLEARANCE_HOLE_MM[3.0] / 2 in radii
-        length, width, thick = frame.plate.sizes
-        holes = len(frame.holes) * np.pi * 2.1**2 * thick
+        length, width, thick = stock.plate.sizes
+        holes = len(stock.holes) * np.pi * 2.1**2 * thick
         assert volume(purchased["plate"]) == pytest.approx(length * width * thick - holes, rel=1e-9)

@@ -2,43 +2,42 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from unittest import mock
 
 import numpy as np
 import pytest
 
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.prototype import PrototypeSpec, StageSpec
+from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
-from tbcad.prototype.frame.layout import FrameLayout
+from tbcad.prototype.frame.shared import BearingHead
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.light import lamps as searched
-from tbcad.prototype.light.lamp import SHORT_STRIP, LampLayout, hidden_by_base
-from tbcad.prototype.light.lamps import SIGNS, lamp_layout
-from tbcad.prototype.purchased.parts import load_parts
-
-PARTS = load_parts()
+from tbcad.prototype.light.lamp import SHORT_STRIP, SIGNS, LampLayout, hidden_by_base
+from tbcad.prototype.light.lamps import lamp_layout
+from tbcad.prototype.part import FrameLayout, Mounted, Site
 
 
 def lit(
-    spec: PrototypeSpec,
-    frame: FrameLayout,
-    prototype: PrototypeLayout,
-    keep_out: KeepOut,
-    **values: object,
+    site: Site, frame: FrameLayout, beside: Mounted | None = None, **keys: object
 ) -> LampLayout | None:
-    chosen = spec.model_copy(update={"light": spec.light.model_copy(update=values)})
-    return lamp_layout(chosen, frame.head.face, prototype.array.camera, keep_out, PARTS)
+    """The lamps beside the head and one part more, with other keys of their section."""
+    light = site.spec.prototype.light.model_copy(update=keys)
+    prototype = site.spec.prototype.model_copy(update={"light": light})
+    changed = replace(site, spec=site.spec.model_copy(update={"prototype": prototype}))
+    head = replace(frame.of(BearingHead), printed=(), purchased=())
+    return lamp_layout(changed, FrameLayout((head, beside) if beside else (head,)))
 
 
 def test_lamps_are_images_of_one_another_that_the_camera_does_not_see(
     frame: FrameLayout, small_prototype: PrototypeLayout
 ) -> None:
-    lamps, camera = frame.lamps, small_prototype.array.camera
+    lamps, camera = frame.find(LampLayout), small_prototype.array.camera
     assert lamps is not None
     assert lamps.places == pytest.approx(lamps.places[0] * SIGNS)
     assert (lamps.places * lamps.inward).sum(axis=1).max() < 0
-    assert [body.part for body in lamps.bodies] == ["STRIP-COB-24V"] * 4
+    assert [body.part for body in lamps.purchased] == ["STRIP-COB-24V"] * 4
     assert (lamps.watt, lamps.lumen) == (pytest.approx(4.0), pytest.approx(90.0))
     assert lamps.current_ma == pytest.approx(4000 / 24)
     corners = lamps.outlines().reshape(-1, 3)
@@ -48,22 +47,18 @@ def test_lamps_are_images_of_one_another_that_the_camera_does_not_see(
     assert not ((np.abs(x) < half[0] * depth) & (np.abs(y) < half[1] * depth)).any()
 
 
-def test_higher_lamps_have_no_room(
-    spec: PrototypeSpec, frame: FrameLayout, small_prototype: PrototypeLayout, keep_out: KeepOut
-) -> None:
-    assert frame.lamps is not None
-    around = (spec, frame, small_prototype, keep_out)
-    z = float(frame.lamps.places[0, 2])
-    again = lit(*around, lamp_z_mm=z)
+def test_higher_lamps_have_no_room(site: Site, frame: FrameLayout) -> None:
+    lamps = frame.of(LampLayout)
+    again = lit(site, frame, lamp_z_mm=float(lamps.places[0, 2]))
     assert again is not None
-    assert np.array_equal(again.places, frame.lamps.places)
+    assert np.array_equal(again.places, lamps.places)
     with pytest.raises(SpecError, match=r"lamp_z_mm -5: .* set it to auto, or to 0 for no lamps"):
-        lit(*around, lamp_z_mm=-5.0)
+        lit(site, frame, lamp_z_mm=-5.0)
     with pytest.raises(SpecError, match="reach down to the base plate"):
-        lit(*around, lamp_z_mm=spec.frame.floor_mm + 20)
-    assert lit(*around, lamp_z_mm=0.0) is None
+        lit(site, frame, lamp_z_mm=site.spec.prototype.frame.floor_mm + 20)
+    assert lit(site, frame, lamp_z_mm=0.0) is None
     with pytest.raises(SpecError, match="lamps take 3000 mA, more than the 1000"):
-        lit(*around, strips=6, segments=6)
+        lit(site, frame, strips=6, segments=6)
 
 
 @contextmanager
@@ -77,42 +72,34 @@ def hiding(condition: Callable[[LampLayout], bool]) -> Iterator[None]:
         yield
 
 
-def test_two_level_lamps_where_four_have_no_room(
-    spec: PrototypeSpec, frame: FrameLayout, small_prototype: PrototypeLayout, keep_out: KeepOut
-) -> None:
+def test_two_level_lamps_where_four_have_no_room(site: Site, frame: FrameLayout) -> None:
     with hiding(lambda layout: not layout.level):
-        lamps = lit(spec, frame, small_prototype, keep_out)
+        lamps = lit(site, frame)
     assert lamps is not None
     assert lamps.level
     assert lamps.places[1] == pytest.approx(lamps.places[0] * [-1, -1, 1])
     assert lamps.sides == (lamps.length, lamps.width)
-    assert [part.name for part in lamps.holders] == ["lamp_holder_2"]
-    (bridge,) = lamps.stands
+    assert [part.name for part in lamps.printed] == ["lamp_holder_2"]
+    (bridge,) = lamps.brackets
     assert len(bridge.holes) == 4
     assert len(lamps.fasteners) == 4  # a screw and a nut on each upright
     assert lamps.screws == (lamps.places[0, 2],)
 
 
-def test_short_strips_where_long_ones_have_no_room(
-    spec: PrototypeSpec, frame: FrameLayout, small_prototype: PrototypeLayout, keep_out: KeepOut
-) -> None:
+def test_short_strips_where_long_ones_have_no_room(site: Site, frame: FrameLayout) -> None:
     with hiding(lambda layout: layout.length > 30 or layout.places[0, 1] == 0):
-        lamps = lit(spec, frame, small_prototype, keep_out)
+        lamps = lit(site, frame)
     assert lamps is not None
     assert lamps.strip.name == SHORT_STRIP
     assert lamps.places[0, 1] != 0
     assert lamps.places[1] == pytest.approx(lamps.places[0] * [-1, -1, 1])
 
 
-def test_level_lamps_keep_clear_of_other_parts(
-    spec: PrototypeSpec, frame: FrameLayout, small_prototype: PrototypeLayout, keep_out: KeepOut
-) -> None:
+def test_level_lamps_keep_clear_of_other_parts(site: Site, frame: FrameLayout) -> None:
     """A part that is where they were found leaves no place at that height."""
-    around = (spec, frame.head.face, small_prototype.array.camera, keep_out, PARTS)
     with hiding(lambda layout: not layout.level):
-        lamps = lamp_layout(*around)
+        lamps = lit(site, frame)
         assert lamps is not None
-        z = float(lamps.places[0, 2])
-        again = spec.model_copy(update={"light": spec.light.model_copy(update={"lamp_z_mm": z})})
+        stand, z = Mounted(brackets=lamps.brackets), float(lamps.places[0, 2])
         with pytest.raises(SpecError, match="meets the lamp stand 1"):
-            lamp_layout(again, *around[1:], beside=[lamps.stands[0].component])
+            lit(site, frame, stand, lamp_z_mm=z)

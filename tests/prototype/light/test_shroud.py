@@ -6,9 +6,9 @@ import pytest
 from tbcad.core.geometry.primitives import Component, box
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import LightSpec
-from tbcad.prototype.frame.layout import FrameLayout
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.light.shroud import ShroudLayout, shroud_layout
+from tbcad.prototype.part import FrameLayout
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout
 

@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tbcad.core.geometry.primitives import (
-    Cylinder,
-    box,
-)
+from tbcad.core.geometry.primitives import Cylinder, box
 from tbcad.core.geometry.rotations import even_angles, rotated_about_x, unit_circle
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.optics.reflection import reflection_points
@@ -20,13 +17,7 @@ from tbcad.core.spec.load import load_spec
 from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec, StageSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.keepout import (
-    EXACT,
-    EXACT_MM,
-    KeepOut,
-    SweptSection,
-    min_distance,
-)
+from tbcad.prototype.keepout import EXACT, EXACT_MM, KeepOut, SweptSection, min_distance
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, led_poses, stage_layout
 from tbcad.prototype.stage.leds import (

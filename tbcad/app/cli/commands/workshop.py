@@ -167,7 +167,7 @@ def assembly(
         print_json({"steps": record(steps)})
         return 0
     file = write_page(folder, out, machine, steps, pictures=pictures, force=force)
-    typer.echo(f"{file}: {len(steps)} steps, {sum(machine.quantities.values())} parts")
+    typer.echo(f"{file}: {len(steps)} steps, {sum(machine.bill.quantities.values())} parts")
     return 0
 
 

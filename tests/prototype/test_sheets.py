@@ -1,7 +1,6 @@
 """Sheets: nothing outside the border, no text over another, dimensions that are true."""
 
 import math
-from collections import defaultdict
 from dataclasses import replace
 from itertools import combinations
 
@@ -11,25 +10,36 @@ import pytest
 from tbcad.cad.drafting.dimensions import labels
 from tbcad.cad.drafting.sheet import BORDER_MM, LEFT_MM, Sheet
 from tbcad.cad.formats.entities import Circle, Dimension, Layer, Line, Text, simple
-from tbcad.prototype.base.layout import BaseLayout
-from tbcad.prototype.drawings.parts import LAMP, PLATE, UPRIGHT, WHEEL, Listed, sheets
 from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.frame.layout import FrameLayout
+from tbcad.prototype.files.bom import PartsList
+from tbcad.prototype.frame.driven import WHEEL
+from tbcad.prototype.frame.stock import PLATE, UPRIGHT
+from tbcad.prototype.light.lamp import LampLayout
+from tbcad.prototype.light.lamps import LAMP
+from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.purchased.parts import load_parts
+from tbcad.prototype.registry import PARTS
 from tests.sheet_texts import check_texts, covered
 
-DRIVES = load_drives(load_parts())
-BILL = Listed("turtleback, n = 18", defaultdict(lambda: 41), defaultdict(lambda: 1))
+LISTED = load_parts()
+BILL = PartsList(
+    tuple({"item": 41, "quantity": 1, "part": part} for part in LISTED), "turtleback, n = 18"
+)
+
+
+def sheets(site: Site, frame: FrameLayout) -> dict[str, Sheet]:
+    return {sheet.name: sheet for part in PARTS for sheet in part.sheets(site, frame, BILL)}
 
 
 @pytest.fixture(scope="module")
-def drawn(frame: FrameLayout, carrier: BaseLayout) -> dict[str, Sheet]:
-    return {sheet.name: sheet for sheet in sheets(frame, carrier, DRIVES[0], BILL)}
+def drawn(site: Site, frame: FrameLayout) -> dict[str, Sheet]:
+    return sheets(site, frame)
 
 
-def test_what_there_is_not_is_not_drawn(frame: FrameLayout, carrier: BaseLayout) -> None:
-    direct, bare = next(one for one in DRIVES if one.coupling), replace(frame, lamps=None)
-    assert [one.name for one in sheets(bare, carrier, direct, BILL)] == [PLATE, UPRIGHT]
+def test_what_there_is_not_is_not_drawn(site: Site, frame: FrameLayout) -> None:
+    direct = next(one for one in load_drives(LISTED) if one.coupling)
+    bare = FrameLayout(tuple(one for one in frame.mounted if not isinstance(one, LampLayout)))
+    assert [*sheets(replace(site, drive=direct), bare)] == [PLATE, UPRIGHT]
 
 
 @pytest.mark.parametrize(("name", "count"), [(PLATE, 2), (WHEEL, 3), (UPRIGHT, 3), (LAMP, 3)])

@@ -1,1 +1,0 @@
-"""Drawings of what is cut, drilled or tapped by hand: a sheet each, as PDF and DXF."""

@@ -1,0 +1,381 @@
+"""What all else is mounted to: base plate, uprights, and the uprights' feet."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.cad.drafting.dimensions import across, arrow, centre_cross, labels
+from tbcad.cad.drafting.sheet import (
+    A3,
+    A4,
+    BESIDE_MM,
+    TEXT_MM,
+    Sheet,
+    drawing_room,
+    notes,
+    notes_beside_title,
+    placed,
+    sheet_frame,
+    table,
+)
+from tbcad.cad.drafting.sheet import rectangle as outline
+from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
+from tbcad.core.geometry.primitives import Component, Primitive, box, rectangle
+from tbcad.core.spec.errors import SpecError
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.fasteners import Fastener
+from tbcad.prototype.files.bom import PartsList
+from tbcad.prototype.frame.shared import (
+    CLEARANCE_HOLE_MM,
+    ENGAGEMENT_MM,
+    EXTRUSION_MM,
+    HALF_FLANGE_MM,
+    OVERLAP_MM,
+    THROUGH_MM,
+    WASHER,
+    BearingHead,
+    drilled_holes,
+    level_prism,
+    on_uprights,
+    webs,
+)
+from tbcad.prototype.light.lamp import LampLayout
+from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
+from tbcad.prototype.purchased.parts import PurchasedPart, choose_part, choose_screw, of_kind
+from tbcad.prototype.sheets import fitted, outer, title_block
+from tbcad.types import Floats
+
+M5_HOLE_MM = CLEARANCE_HOLE_MM[5.0]
+
+# Feet of the uprights.
+FOOT_HEIGHT_MM, FOOT_DEPTH_MM = 50.0, 48.0
+FOOT_WEB_MM = 15.0  # from the middle to the webs
+FOOT_SCREW_MM = 13.0  # from the foot's ends to its screws
+WEB_SETBACK_MM = 4.0  # of webs from the ends of their flanges
+TAPPED_M5_MM = 4.2
+SLOT_DEPTH_MM = 6.1  # of an extrusion of 20 mm; no list gives it
+PLATE_BORDER_MM = 10.0  # of the plate beyond the brackets' feet
+HOLES = "plate_holes.csv"
+UPRIGHTS = 2
+PLATE, UPRIGHT = "drawing_plate", "drawing_upright"
+TABLE_MM = (10.0, 18.0, 18.0, 14.0, 42.0)  # widths of the columns of the hole table
+TABLE_HEAD = ("hole", "x", "y", "thread", "holds")
+DATUM_MM, OFF_MM = 8.0, 4.0  # length of the arrows at the origin, and of lines beyond the part
+LAMP_NOTES = {
+    0: (),
+    1: ("Left end on the plate. Marked: the screw of the lamps' holder, in the front slot.",),
+    2: ("Left end on the plate. Marked: both screws of a lamp's holder, in the front slot.",),
+}
+LEVEL_MM = 8.0  # from one dimension line to the next
+CUT_MM = 1.0  # tolerance of what is sawn, to either side: feet clamp anywhere along
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stock(Mounted):
+    """Base plate and uprights."""
+
+    plate: PurchasedPart  # part of the base plate
+    corner: Floats  # the plate's, from where its holes are measured, (x, y) as the holes, mm, (2,)
+    holes: Floats  # its tapped M5 holes, (x, y) along the frame's axes, mm, (h, 2)
+    holds: tuple[str, ...]  # bracket that each hole holds
+    upright: PurchasedPart  # part that the uprights are cut from
+    length: float  # of the uprights, mm
+    floor: float  # height (z) of the plate's upper face, which the uprights stand on, mm
+
+
+def stock_layout(site: Site, before: FrameLayout) -> Stock:
+    """The plate under all feet, and the uprights; SpecError where none on sale is large enough."""
+    upright, length, bars = _uprights(site, before.of(BearingHead))
+    plate, body, corner = _plate(site, before.brackets)
+    return Stock(
+        purchased=(body, *bars),
+        fasteners=tuple(_plate_fasteners(site, before.brackets)),
+        listed={plate.name: 1, upright.name: UPRIGHTS},
+        plate=plate,
+        corner=corner,
+        holes=np.vstack([bracket.holes for bracket in before.brackets]),
+        holds=tuple(one.component.name for one in before.brackets for _ in one.holes),
+        upright=upright,
+        length=length,
+        floor=before.of(BearingHead).top - length,
+    )
+
+
+def feet_layout(site: Site, before: FrameLayout) -> Mounted:
+    """The feet on the fronts and the backs of both uprights."""
+    face = before.of(BearingHead).face
+    return Mounted(brackets=tuple(_upright_foot(site, face, side) for side in (1, -1)))
+
+
+def _upright_foot(site: Site, face: float, side: int) -> Bracket:
+    """A foot on the front (side 1) or the back (side -1) of both uprights.
+
+    face is the level coordinate of the uprights' front.
+    """
+    spec, axes = site.spec.prototype.frame, site.axes
+    low, thick, half = spec.floor_mm, spec.flange_mm, spec.uprights_mm / 2 + HALF_FLANGE_MM
+    start = face if side > 0 else face - EXTRUSION_MM
+
+    def at(depth: float, height: float) -> tuple[float, float]:
+        return start + side * depth, low + height
+
+    def plate(depth: float, height: float) -> Primitive:
+        (x0, z0), (x1, z1) = at(0.0, 0.0), at(depth, height)
+        return level_prism(rectangle((min(x0, x1), z0), (max(x0, x1), z1)), -half, half, axes)
+
+    inside = thick - OVERLAP_MM
+    corners = np.array(
+        [
+            at(inside, inside),
+            at(FOOT_DEPTH_MM - WEB_SETBACK_MM, inside),
+            at(inside, FOOT_HEIGHT_MM - WEB_SETBACK_MM),
+        ]
+    )
+    added = [plate(thick, FOOT_HEIGHT_MM), plate(FOOT_DEPTH_MM, thick)]
+    added += webs(corners, FOOT_WEB_MM, spec.web_mm, axes)
+    screw, _ = at(FOOT_DEPTH_MM - FOOT_SCREW_MM, 0.0)
+    _, height = at(0.0, FOOT_HEIGHT_MM - FOOT_SCREW_MM)
+    across = (-spec.uprights_mm / 2, spec.uprights_mm / 2)
+    under = [np.array([screw, y, low]) @ axes for y in across]
+    in_uprights = [np.array([start, y, height]) @ axes for y in across]
+    removed = drilled_holes(under, thick * axes[2], M5_HOLE_MM)
+    removed += drilled_holes(in_uprights, side * thick * axes[0], M5_HOLE_MM)
+    component = Component(
+        "upright_foot_front" if side > 0 else "upright_foot_back",
+        "foot of the uprights",
+        tuple(added),
+        tuple(removed),
+        (-axes[2], -side * axes[0]),
+    )
+    ends = (start, start + side * FOOT_DEPTH_MM)
+    foot = np.array([[x, y] for x in ends for y in (-half, half)])
+    in_plate = np.array([[screw, y] for y in across])
+    inward = -side * axes[0]
+    fasteners = on_uprights(component.name, in_uprights, inward, thick, site.parts)
+    return Bracket(component, in_plate, foot, fasteners)
+
+
+def _uprights(site: Site, head: BearingHead) -> tuple[PurchasedPart, float, list[Component]]:
+    """Part and length of the uprights, and their bodies."""
+    spec, axes = site.spec.prototype.frame, site.axes
+    length = head.top - spec.floor_mm
+    hint = "make prototype.frame.floor_mm greater, or add a longer one"
+    part = choose_part(site.parts, "extrusions", "prototype.frame.floor_mm", hint, length_mm=length)
+    half, uprights = EXTRUSION_MM / 2, []
+    for name, sign in (("upright_left", 1), ("upright_right", -1)):
+        y = sign * spec.uprights_mm / 2
+        low = head.face - EXTRUSION_MM, y - half, spec.floor_mm
+        body = box(low, (head.face, y + half, head.top), axes)
+        what = f"{part.what}, cut to {length:.1f} mm"
+        slots = _slots(part["slot_mm"], (head.face - half, y), (spec.floor_mm, head.top), axes)
+        uprights.append(Component(name, what, (body,), slots, part=part.name))
+    return part, length, uprights
+
+
+def _slots(
+    width: float, middle: tuple[float, float], heights: tuple[float, float], axes: Floats
+) -> tuple[Primitive, ...]:
+    """The four slots of an extrusion, simplified: as wide inside as at its face."""
+    half, inner, outer = width / 2, EXTRUSION_MM / 2 - SLOT_DEPTH_MM, EXTRUSION_MM / 2 + THROUGH_MM
+    low, high = (np.array([*middle, z]) for z in (heights[0] - THROUGH_MM, heights[1] + THROUGH_MM))
+    ends = ((inner, outer), (-outer, -inner))
+    sides = [((a, -half, 0.0), (b, half, 0.0)) for a, b in ends]
+    sides += [((-half, a, 0.0), (half, b, 0.0)) for a, b in ends]
+    return tuple(box(low + one, high + other, axes) for one, other in sides)
+
+
+def _plate(site: Site, brackets: Sequence[Bracket]) -> tuple[PurchasedPart, Component, Floats]:
+    """The smallest plate under all feet, centred under them, with tapped holes; its corner."""
+    floor, axes = site.spec.prototype.frame.floor_mm, site.axes
+    feet = np.vstack([bracket.foot for bracket in brackets])
+    low, high = feet.min(axis=0) - PLATE_BORDER_MM, feet.max(axis=0) + PLATE_BORDER_MM
+    middle, (length, width) = (low + high) / 2, high - low
+    candidates = [
+        part
+        for part in of_kind(site.parts, "plates")
+        if part["length_mm"] >= length and part["width_mm"] >= width
+    ]
+    if not candidates:
+        raise SpecError(
+            f"no base plate in plates.csv is {length:.0f} x {width:.0f} mm: add one, or make "
+            "prototype.camera_diameter_mm smaller"
+        )
+    part = min(candidates, key=lambda plate: plate["length_mm"] * plate["width_mm"])
+    half = np.array([part["length_mm"], part["width_mm"]]) / 2
+    bottom = floor - part["thickness_mm"]
+    corners = (*(middle - half), bottom), (*(middle + half), floor)
+    places = [np.array([*hole, bottom]) @ axes for bracket in brackets for hole in bracket.holes]
+    holes = drilled_holes(places, part["thickness_mm"] * axes[2], TAPPED_M5_MM)
+    body = Component("plate", part.what, (box(*corners, axes),), tuple(holes), part=part.name)
+    return part, body, middle - half
+
+
+def _plate_fasteners(site: Site, brackets: Sequence[Bracket]) -> Iterator[Fastener]:
+    """Screws with washers through the brackets' feet into the base plate's threads."""
+    spec, axes = site.spec.prototype.frame, site.axes
+    screw = choose_screw(site.parts, 5.0, spec.flange_mm + 2 * ENGAGEMENT_MM)
+    washer, down = site.parts[WASHER], -axes[2]
+    for bracket in brackets:
+        through = (bracket.component.name, "plate")
+        for x, y in bracket.holes.tolist():
+            place = np.array([x, y, spec.floor_mm + spec.flange_mm]) @ axes
+            yield Fastener(washer, place, down, through[:1])
+            yield Fastener(screw, place - washer["thickness_mm"] * down, down, through)
+
+
+@planned("Drill the plate, cut the uprights", "plate")
+def shop_step(machine: AssembledMachine) -> Words:
+    """Plate and uprights as drawn; what must be matt black is blackened before it is mounted."""
+    stock = machine.record.frame_stock
+    plate, upright = map(machine.record.drawing_of, (stock.plate, stock.upright))
+    black = ", ".join(one.name.replace("_", " ") for one in machine.record.bought if one.finish)
+    does = [
+        f"Drill the plate {machine.ref(stock.plate)} by {plate or HOLES} and tap M5 through.",
+        f"Saw both uprights {machine.ref(stock.upright)} to {stock.uprights_cut_to_mm:.1f} mm"
+        f"{when(upright, f' ({upright})')}: they are mounted later.",
+        "Deburr all edges.",
+        when(
+            black,
+            f"Paint, blacken or tape matt black what is not yet: {black}, heads of screws. Mask "
+            "threads, slots, bores, teeth and what bearings sit on.",
+        ),
+    ]
+    checks = [
+        f"An M5 screw turns by hand into each of the plate's holes ({HOLES} lists them).",
+        "Stood next to each other, both uprights are equally long to 0.2 mm.",
+    ]
+    return does, checks
+
+
+@planned("Feet and uprights on the plate", "upright_*")
+def frame_step(machine: AssembledMachine) -> Words:
+    """Feet and uprights; how many T-nuts each upright has in its front slot and in its back one."""
+    axis = np.array(machine.record.frame.axis)
+    nuts = [one.along @ axis for one in machine.fasteners if machine.kind(one.part) == "tnuts"]
+    # Screws go in from the front against the axis, which leans from the uprights to the camera.
+    front = sum(along < 0 for along in nuts)
+    does = [
+        f"Slide all T-nuts into the slots of the uprights, {front // UPRIGHTS} in the front one "
+        f"(toward the camera) of each and {(len(nuts) - front) // UPRIGHTS} in the back one: one "
+        "at the lower end of each slot for a foot, the others for what comes later (the picture "
+        "shows which).",
+        "Stand the uprights between the two feet, the feet's flanges against them. Screws through "
+        "the feet into the T-nuts, loosely.",
+        "Screw the feet down on the plate, a washer under each head. Then tighten the T-nuts' "
+        "screws.",
+    ]
+    checks = [
+        "A square shows both uprights at a right angle to the plate in both directions.",
+        "The distance between them is the same at both ends to 0.5 mm.",
+    ]
+    return does, checks
+
+
+def plate_sheet(stock: Stock, bill: PartsList) -> Sheet:
+    """The plate from above with its tapped holes, and their table; the origin is its corner."""
+    part, paper = stock.plate, A3
+    size = part["length_mm"], part["width_mm"]
+    left, low, right, high = drawing_room(paper)
+    left_of_table = right - sum(TABLE_MM)
+    scale, origin = fitted(size, (left, low, left_of_table - BESIDE_MM, high))
+    holes = [
+        Circle(Layer.CUT, (x, y), TAPPED_M5_MM / 2)
+        for x, y in (stock.holes - stock.corner).tolist()
+    ]
+    part_drawn = placed([outline((0, 0, *size), Layer.CUT), *holes], origin, scale)
+    circles = [entity for entity in part_drawn if isinstance(entity, Circle)]
+    numbers = [str(number) for number in range(1, len(holes) + 1)]
+    title = "base plate"
+    text = (
+        f"Plate {size[0]:g} x {size[1]:g} x {part['thickness_mm']:g}, bought to this size.",
+        f"{len(holes)} x M5: drill {TAPPED_M5_MM:g} through, tap through.",
+        "x runs from the uprights to the camera, both axes from the corner at the arrows.",
+        "Seen from the side that carries the brackets. Deburr all edges.",
+    )
+    entities = [
+        *sheet_frame(paper, scale, title_block(bill, title, part, "from above")),
+        *part_drawn,
+        *(line for circle in circles for line in centre_cross(circle)),
+        *labels(circles, numbers),
+        *outer(origin, (size[0] * scale, size[1] * scale), size),
+        *_datum(origin),
+        *table((left_of_table, high), TABLE_MM, (TABLE_HEAD, *_hole_cells(stock))),
+        *notes_beside_title(paper, text),
+    ]
+    return Sheet(PLATE, title, part.name, paper, scale, origin, tuple(entities))
+
+
+def _datum(origin: Point) -> Iterator[Entity]:
+    """Arrows along x and y at the origin, outside the part."""
+    x, y = origin
+    corner = x - OFF_MM, y - OFF_MM
+    right, up = (x + DATUM_MM, corner[1]), (corner[0], y + DATUM_MM)
+    beyond_x, beyond_y = (right[0] + 1.0, right[1] - 1.0), (up[0] - 0.6, up[1] + 1.0)
+    for tip, place, name in ((right, beyond_x, "x"), (up, beyond_y, "y")):
+        yield Line(Layer.DIMENSIONS, corner, tip)
+        yield arrow(tip, corner)
+        yield Text(Layer.DIMENSIONS, place, TEXT_MM, name)
+
+
+def _hole_cells(stock: Stock) -> list[tuple[str, ...]]:
+    places = (stock.holes - stock.corner).tolist()
+    return [
+        (str(number), f"{x:.2f}", f"{y:.2f}", "M5", name.replace("_", " "))
+        for number, ((x, y), name) in enumerate(zip(places, stock.holds, strict=True), 1)
+    ]
+
+
+def upright_sheet(stock: Stock, screws: Sequence[float], bill: PartsList) -> Sheet:
+    """An upright, lying: its length, and heights (z) of a lamp holder's screws, if any.
+
+    The origin is its lower left corner.
+    """
+    part, paper, length = stock.upright, A4, stock.length
+    left, low, right, high = drawing_room(paper)
+    side, slot = part["side_mm"], part["slot_mm"]
+    middle = low + (high - low) / 2
+    scale, origin = fitted((length, side), (left, middle, right, high))
+    lines = [
+        Line(Layer.CUT, (0.0, side / 2 + sign * slot / 2), (length, side / 2 + sign * slot / 2))
+        for sign in (-1, 1)
+    ]
+    drawn = placed([outline((0, 0, length, side), Layer.CUT), *lines], origin, scale)
+    centre = origin[1] + side * scale / 2
+    heights = sorted(z - stock.floor for z in screws)
+    title = "upright"
+    text = (
+        f"Saw from {part.what}.",
+        f"Length {length:.1f} ± {CUT_MM:g}, both of the same length to 0.2; ends square to 0.2.",
+        "No holes: head and feet are held by T-nuts in the slots. Deburr both ends.",
+        *LAMP_NOTES[len(heights)],
+    )
+    entities = [
+        *sheet_frame(paper, scale, title_block(bill, title, part, "from the side")),
+        *drawn,
+        Line(Layer.CENTRE, (origin[0] - 4, centre), (origin[0] + length * scale + 4, centre)),
+        *outer(origin, (length * scale, side * scale), (round(length, 1), side)),
+        *_heights(origin, side, heights, scale),
+        *notes((left + BESIDE_MM, middle), right - left - 2 * BESIDE_MM, text),
+    ]
+    return Sheet(UPRIGHT, title, part.name, paper, scale, origin, tuple(entities))
+
+
+def _heights(
+    origin: Point, side: float, heights: Sequence[float], scale: float
+) -> Iterator[Entity]:
+    """Screws on a lying upright, each with its distance from the left end."""
+    (x, low), high = origin, origin[1] + side * scale
+    for level, height in enumerate(heights, 1):
+        at = x + height * scale
+        yield Line(Layer.CENTRE, (at, low - OFF_MM), (at, high + OFF_MM))
+        yield across((x, high), (at, high), high + level * LEVEL_MM, f"{height:.1f}")
+
+
+def _sheets(_: Site, frame: FrameLayout, bill: PartsList) -> tuple[Sheet, ...]:
+    stock, lamps = frame.of(Stock), frame.find(LampLayout)
+    return plate_sheet(stock, bill), upright_sheet(stock, lamps.screws if lamps else (), bill)
+
+
+STOCK = Part((shop_step,), stock_layout, _sheets, {"plate": "prototype.frame.floor_mm less"})
+FEET = Part((frame_step,), feet_layout)
