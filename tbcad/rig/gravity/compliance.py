@@ -10,7 +10,7 @@ from tbcad.rig.gravity.elastic import Cells, fill_cells, hold
 from tbcad.types import Bools, Floats, Ints
 
 N_PER_G = 9.80665e-3  # weight of a gram, newtons
-CELL_MM = 6.0
+CELL_MM = 5.0
 
 
 @dataclass(frozen=True)

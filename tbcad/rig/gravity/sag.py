@@ -52,6 +52,7 @@ class Sag:
     angle: Floats  # of the base at each stop, radians, (s,)
     centre: Floats  # of the bodies without weight, in the base's frame, mm, (k, 3)
     axes: Floats  # of that frame at angle zero in the shell's, as rows, (3, 3)
+    gravity: Floats  # direction of gravity at each stop, (s, 3)
     of: dict[str, Floats]  # by what bends: carrier, head, shaft, uprights, (s, k, 3)
 
     @property
@@ -100,7 +101,7 @@ def build_sag(export: ExportedDesign) -> Sag:
     of = {"carrier": np.einsum("kag,sg->ska", carrier, gravity)}
     for name, flexible in _holding(record, solids, axes, held.start, material).items():
         of[name] = _moved_by(flexible, held.start, bodies.centre, load, (angle, down))
-    return Sag(angle, bodies.centre, axes, of)
+    return Sag(angle, bodies.centre, axes, gravity, of)
 
 
 def _solids(path: Path, axes: Floats) -> dict[str, Trimesh]:
