@@ -8,6 +8,7 @@ The frame here is the base's at angle zero: x along the axis w, y at azimuth zer
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from trimesh import Trimesh
@@ -16,6 +17,7 @@ from trimesh.util import concatenate
 from tbcad.cad.formats.glb import read_glb
 from tbcad.core.geometry.rotations import rotated_about_x
 from tbcad.core.geometry.vectors import norm
+from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.tables import BallRow, StopRow
@@ -43,6 +45,8 @@ SCREW_MM, REACH_MM = 5.0, 10.0
 MPA_PER_GPA = 1e3
 UPRIGHTS, BEARINGS = ("upright_left", "upright_right"), ("bearing_front", "bearing_rear")
 X = np.array([1.0, 0.0, 0.0])
+LEFT = {"turn and run-out": [3, 1, 2], "six freedoms": [0, 1, 2, 3, 4, 5]}
+"""Freedoms of `Sag.unmodelled` that a calibration may give to each stop."""
 
 
 @dataclass(frozen=True)
@@ -77,14 +81,46 @@ class Sag:
         left = left - left @ np.linalg.pinv(motion).T @ motion.T
         return norm(left.reshape(moved.shape))
 
+    def record(self) -> dict[str, Any]:
+        """For other programs, in mm: by what bends, and what is left after calibration."""
+        ways = {name: self.between_stops(moved) for name, moved in self.of.items()}
+        left = {name: self.unmodelled(self.whole, freedoms) for name, freedoms in LEFT.items()}
+        return {
+            "schema": "tbcad-sag/1",
+            "between_stops_mm": self.between_stops(self.whole),
+            "parts_between_stops_mm": ways,
+            "left_rms_mm": {name: float(np.sqrt((one**2).mean())) for name, one in left.items()},
+            "left_max_mm": {name: float(one.max()) for name, one in left.items()},
+        }
+
+    def lines(self) -> list[str]:
+        """The same in words."""
+        record = self.record()
+        rms, most = record["left_rms_mm"], record["left_max_mm"]
+        ways = ", ".join(f"{n} {mm:.2f}" for n, mm in record["parts_between_stops_mm"].items())
+        return [
+            f"Sag: a ball moves by up to {record['between_stops_mm']:.2f} mm between stops",
+            f"  by what bends: {ways}",
+            *(
+                f"  left by {name} for each stop: {rms[name]:.3f} mm RMS, {most[name]:.3f} at most"
+                for name in LEFT
+            ),
+        ]
+
 
 def build_sag(export: ExportedDesign) -> Sag:
     """The sag of a build's prototype, by the modulus and the infill of its spec's printer.
 
-    InputError: there is no prototype, or its files cannot be read.
+    InputError: there is no prototype, its files cannot be read, or its drive has no shaft of its
+    own.
     """
     folder, printer = export.folder, export.spec.printer
     record = Prototype.read(folder / NAME)
+    if "shaft" not in {body.name for body in record.bought}:
+        raise InputError(
+            f"{folder / NAME}: the base turns on the drive's own bearings, whose stiffness no list "
+            'gives: sag is computed for prototype.base.drive = "nema17-belt"'
+        )
     axes = np.array([record.frame.axis, record.frame.zero, record.frame.third])
     shown = read_glb(folder / record.assembly.glb)
     solids = {
@@ -100,7 +136,7 @@ def build_sag(export: ExportedDesign) -> Sag:
     load = axes @ np.array(record.drive.centre_mm), record.drive.mass_g
     of = {"carrier": np.einsum("kag,sg->ska", carrier, gravity)}
     for name, flexible in _holding(record, solids, axes, held.start, material).items():
-        of[name] = _moved_by(flexible, held.start, bodies.centre, load, (angle, down))
+        of[name] = moved_by(flexible, held.start, bodies.centre, load, (angle, down))
     return Sag(angle, bodies.centre, axes, gravity, of)
 
 
@@ -170,7 +206,7 @@ def _uprights(solids: dict[str, Trimesh], axes: Floats, hub: Floats) -> Floats:
     return moved_to(column, hub - axes @ top)
 
 
-def _moved_by(
+def moved_by(
     flexible: Floats,
     hub: Floats,
     centre: Floats,
