@@ -36,6 +36,11 @@ class PrinterSpec(Section):
     """Width of the bed's border that stays free, also below the printer's full height."""
     density_g_cm3: float = Field(1.27, gt=0, le=20)
     """Density of the printed material (PETG 1.27, PLA 1.24, PA12 1.01)."""
+    modulus_gpa: float = Field(2.0, gt=0, le=300)
+    """Young's modulus of the printed material where it is solid (PETG 2.0, PLA 3.0, PA12 1.7), for
+    how far the base sags under its weight."""
+    infill: float = Field(0.25, ge=0.05, le=1)
+    """Share of material inside the four perimeters."""
 
 
 class CameraSpec(Section):

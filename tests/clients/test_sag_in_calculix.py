@@ -1,0 +1,116 @@
+"""CalculiX on the carrier of a build: quadratic tetrahedra that Gmsh makes of its STEP file."""
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.app.cli import run
+from tbcad.light.simulate.scene.reflector import read_export
+from tbcad.records.tables import BallRow
+from tbcad.rig.gravity.compliance import N_PER_G
+from tbcad.rig.gravity.sag import build_sag
+from tbcad.types import Floats, Ints
+
+pytestmark = [
+    *(pytest.mark.clients, pytest.mark.slow),
+    pytest.mark.skipif(not shutil.which("ccx"), reason="calculix-ccx is not installed"),
+]
+
+SMALL = ("optics.n=4", "prototype.k=3", "mesh.structure_error_mm=0.1", "printer.infill=1")
+SIZE_MM, CURVED = 6.0, 8  # of tetrahedra, and how many to a turn
+MODULUS_MPA, POISSON, DENSITY = 2000.0, 0.37, 1.27e-9  # t/mm^3
+G_MM_S2 = 9806.65
+BORE_MM = 8.0  # of the shaft, on which the part is held
+NEAR_MM = 6.0  # nodes no farther from a ball's surface carry it
+GMSH_TO_CALCULIX = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sag") / "build"
+    options = [word for key in SMALL for word in ("--set", key)]
+    words = ["build", "--parts", "prototype", "--no-verify", *options, "--out", str(folder)]
+    assert run(words) == 0
+    return folder
+
+
+def tetrahedra(step: Path) -> tuple[Floats, Ints]:
+    """Nodes (n, 3) in mm, and ten of them for each tetrahedron."""
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.importShapes(str(step))
+        gmsh.model.occ.synchronize()
+        options = {"MeshSizeMax": SIZE_MM, "MeshSizeFromCurvature": CURVED, "ElementOrder": 2}
+        for name, value in options.items():
+            gmsh.option.setNumber(f"Mesh.{name}", value)
+        gmsh.option.setNumber("Mesh.SecondOrderLinear", 1)
+        gmsh.model.mesh.generate(3)
+        tags, places, _ = gmsh.model.mesh.getNodes()
+        _, _, corners = gmsh.model.mesh.getElements(3)
+    finally:
+        gmsh.finalize()
+    index = np.zeros(int(tags.max()) + 1, int)
+    index[tags.astype(int)] = np.arange(len(tags))
+    return places.reshape(-1, 3), index[corners[0].astype(int)].reshape(-1, 10)
+
+
+def deck(nodes: Floats, elements: Ints, held: Ints, loads: Floats) -> str:
+    """A static analysis of loads (3, n, 3) with gravity along each axis."""
+    lines = ["*NODE,NSET=ALL"]
+    lines += [f"{i},{x:.9g},{y:.9g},{z:.9g}" for i, (x, y, z) in enumerate(nodes, 1)]
+    lines.append("*ELEMENT,TYPE=C3D10,ELSET=PART")
+    for number, corners in enumerate(elements[:, GMSH_TO_CALCULIX] + 1, 1):
+        lines.append(f"{number},{','.join(map(str, corners))}")
+    lines += ["*MATERIAL,NAME=PRINTED", "*ELASTIC", f"{MODULUS_MPA},{POISSON}", "*DENSITY"]
+    lines += [f"{DENSITY}", "*SOLID SECTION,ELSET=PART,MATERIAL=PRINTED", "*NSET,NSET=HELD"]
+    lines += [*(f"{node + 1}," for node in held), "*BOUNDARY", "HELD,1,3"]
+    for axis, load in enumerate(loads):
+        down = ",".join("1." if k == axis else "0." for k in range(3))
+        lines += ["*STEP", "*STATIC", "*DLOAD,OP=NEW", f"PART,GRAV,{G_MM_S2},{down}"]
+        lines.append("*CLOAD,OP=NEW")
+        for node, k in np.argwhere(load):
+            lines.append(f"{node + 1},{k + 1},{load[node, k]:.9g}")
+        lines += ["*NODE PRINT,NSET=ALL", "U", "*END STEP"]
+    return "\n".join(lines) + "\n"
+
+
+def solved(folder: Path, text: str, count: int) -> Floats:
+    """Displacements (3, n, 3) by each load."""
+    (folder / "part.inp").write_text(text)
+    program = shutil.which("ccx")
+    assert program
+    subprocess.run([program, "part"], cwd=folder, check=True, capture_output=True, timeout=900)
+    words = [line.split() for line in (folder / "part.dat").read_text().splitlines()]
+    numbers = [row for row in words if len(row) == 4 and row[0].isdigit()]
+    return np.array(numbers, dtype=float).reshape(3, count, 4)[:, :, 1:]
+
+
+def test_balls_sag_as_in_calculix(built: Path, tmp_path: Path) -> None:
+    found = build_sag(read_export(built))
+    record = json.loads((built / "prototype.json").read_text())
+    part = next(one for one in record["parts"] if one["name"] == "carrier")
+    nodes, elements = tetrahedra(built / part["step"])
+    nodes = nodes @ found.axes.T
+    balls = BallRow.read(built)
+    near = [
+        np.flatnonzero(np.linalg.norm(nodes - at, axis=1) < ball.body_radius_mm + NEAR_MM)
+        for at, ball in zip(found.centre, balls, strict=True)
+    ]
+    loads = np.zeros((3, len(nodes), 3))
+    for which, ball in zip(near, balls, strict=True):
+        mass = ball.mass_g or 4e-3 / 3 * np.pi * ball.body_radius_mm**3 * 1.27
+        loads[:, which] += np.eye(3)[:, None] * mass * N_PER_G / len(which)
+    out = np.hypot(nodes[:, 1], nodes[:, 2])
+    bore = out < BORE_MM / 2 + 0.05
+    moved = solved(tmp_path, deck(nodes, elements, np.flatnonzero(bore), loads), len(nodes))
+    theirs = np.array([moved[:, which].mean(axis=1) for which in near]).transpose(0, 2, 1)
+    expected = np.einsum("kag,sg->ska", theirs, found.gravity)
+    error = np.linalg.norm(found.of["carrier"] - expected) / np.linalg.norm(expected)
+    print(f"carrier of {len(nodes)} nodes: {error:.1%} from CalculiX")
+    assert error < 0.15
