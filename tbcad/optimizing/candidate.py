@@ -33,7 +33,7 @@ from tbcad.light.simulate.views.viewpoints import (
     pinhole_targets,
     viewpoints_around,
 )
-from tbcad.types import Bytes, Floats, Ints
+from tbcad.types import Floats
 
 AZIMUTHS, DISTANCE_MM = 4, 640.0
 

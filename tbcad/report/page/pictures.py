@@ -12,6 +12,7 @@ import numpy as np
 
 from tbcad.cad.formats.pictures import visible_files
 from tbcad.errors import InputError
+from tbcad.types import Bytes
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
 MAX_FILE_BYTES = 40_000_000

@@ -15,7 +15,7 @@ from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import camera_around_object, exact_tracer, reflect_pixels
 from tbcad.light.simulate.scene.reflector import Reflector, reflectors
 from tbcad.light.simulate.views.viewpoints import pinhole_targets
-from tbcad.tolerancing.montecarlo.coverage import mirror_coverage, pointing
+from tbcad.tolerancing.montecarlo.coverage import pointing
 from tbcad.tolerancing.montecarlo.draws import draw
 from tbcad.tolerancing.montecarlo.edge_model import edge_model
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
