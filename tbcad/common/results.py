@@ -1,9 +1,7 @@
 """Results as tables, plots, and the files of a study; the same results give the same bytes."""
 
 import csv
-import errno
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
 from io import StringIO
@@ -197,20 +195,6 @@ class Study:
         """The figures as a table."""
         rows = tuple(astuple(figure) for figure in self.figures)
         return Table(f"{self.name}-summary", SUMMARY_COLUMNS, rows, self.notes)
-
-
-def check_study_folder(out: Path) -> None:
-    """Check, before any work, that files can be written into a folder, which need not exist.
-
-    InputError: they cannot.
-    """
-    with write_errors_as_input_errors(out):
-        absolute = out.absolute()
-        existing = next(folder for folder in (absolute, *absolute.parents) if folder.exists())
-        if not existing.is_dir():
-            raise NotADirectoryError(errno.ENOTDIR, f"{existing} is a file")
-        if not os.access(existing, os.W_OK | os.X_OK):
-            raise PermissionError(errno.EACCES, "no right to write there")
 
 
 def write_study(

@@ -1,5 +1,6 @@
 """Files of the user: those a command reads stay, single ones it writes, foreign ones it keeps."""
 
+import errno
 import os
 import re
 import shutil
@@ -92,9 +93,18 @@ def check_file(file: Path, force: bool, inputs: Iterable[Path | None] = ()) -> N
 
 
 def check_tables(out: Path) -> None:
-    """Refuse, before any work, to write tables and plots into what tbcad wrote as a whole."""
+    """Refuse, before any work, a folder for tables and plots that cannot be written.
+
+    Nor may it be in what tbcad wrote as a whole; it need not exist.
+    """
     with write_errors_as_input_errors(out):
         refuse_inside(out, out.resolve() / "table")
+        absolute = out.absolute()
+        existing = next(folder for folder in (absolute, *absolute.parents) if folder.exists())
+        if not existing.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, f"{existing} is a file")
+        if not os.access(existing, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, "no right to write there")
 
 
 def refuse_member(file: Path) -> None:

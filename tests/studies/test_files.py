@@ -14,7 +14,6 @@ from tbcad.common.results import (
     SUMMARY_COLUMNS,
     Study,
     Table,
-    check_study_folder,
     csv_text,
     study_files,
     write_study,
@@ -34,6 +33,7 @@ from tbcad.light.simulate.capture.photograph import (
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.reflector import Reflector, reflectors
 from tbcad.light.simulate.views.viewpoints import BY_NEAREST, viewpoints_around
+from tbcad.output.single_files import check_tables
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
 from tbcad.studies.elevation import capture_area, elevation
 from tbcad.studies.paper import is_table_i, with_lens_of_table_i
@@ -170,8 +170,8 @@ def test_only_its_own_files_are_replaced(tmp_path: Path) -> None:
     assert {path.name for path in out.iterdir()} == {"mine.txt", *(path.name for path in files)}
     assert (out / "elevation.csv").read_bytes() == study_files(study)["elevation.csv"]
     with pytest.raises(InputError, match="is a file"):
-        check_study_folder(out / "mine.txt" / "studies")
-    check_study_folder(tmp_path / "not" / "yet")
+        check_tables(out / "mine.txt" / "studies")
+    check_tables(tmp_path / "not" / "yet")
     assert not (tmp_path / "not").exists()
 
 

@@ -180,11 +180,10 @@ def _command(prepare: Callable[..., Work], subject: Callable[..., object]) -> Ca
 
 def _run_study(out: Path, json: bool, plot: "PlotFormat", work: Work) -> int:
     """Make a study, write its files, and show its figures next to the paper's."""
-    from tbcad.common.results import check_study_folder, write_study
+    from tbcad.common.results import write_study
     from tbcad.output.single_files import check_tables
 
     check_tables(out)
-    check_study_folder(out)
     with stages(2) as screen:
         screen.stage("study: mirrors and rays")
         result = work(screen.detail)

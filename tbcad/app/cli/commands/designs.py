@@ -148,10 +148,9 @@ def tolerance(
     from tbcad.app.api.verification import tolerance as analyse
 
     checked_process(options)  # before heavy libraries are loaded
-    from tbcad.common.results import check_study_folder, write_study
+    from tbcad.common.results import write_study
     from tbcad.tolerancing.report import json_text, summary_text, tolerance_study
 
-    check_study_folder(out)
     with stages(6 + (options.process is None) + options.margins) as screen:
         analysis = analyse(options.on(screen))
         screen.stage("tables and plots")
@@ -176,14 +175,13 @@ def _as_built(options: ToleranceOptions, calibration: Path, out: Path, json: boo
     from json import dumps
 
     from tbcad.common.atomic_files import replace_files
-    from tbcad.common.results import check_study_folder, csv_text
+    from tbcad.common.results import csv_text
     from tbcad.rig.calibrated_solids import (
         as_built_tolerance,
         summary,
         tolerance_record,
     )
 
-    check_study_folder(out)
     with stages(1) as screen:
         screen.stage("coverage and rays as calibrated")
         found = as_built_tolerance(calibration, exports, builds, seed)
