@@ -163,7 +163,7 @@ THREEMFS: tuple[Mutation, ...] = (
         (
             "another relation",
             members(lambda m: {**m, RELATIONS: m[RELATIONS].replace(b"3dmodel", b"thumbnail", 1)}),
-            *(NAME, "thumbnail"),
+            *(NAME, "<Relationship "),
         ),
         (
             "an extension asked for",

@@ -46,7 +46,8 @@ def refuse_foreign(table: StepTable) -> None:
     rules = _rules()
     if not _form("", rules["header"]).pattern.fullmatch("".join(table.head.split())):
         raise ValueError(f"the header is none of tbcad's: {table.head[:SHOWN]!r}")
-    bodies, found, count = table.bodies, {}, Counter[str]()
+    bodies, count = table.bodies, Counter[str]()
+    found: dict[int, list[tuple[Form, tuple[str, ...]]]] = {}
     for kind, every in table.numbered.items():
         numbers = every
         if kind in rules["geometry"]:

@@ -66,8 +66,8 @@ class StepTable:
         if plain.count("(") != plain.count(")"):
             raise ValueError("broken STEP text: a bracket too many")
         self.head = text[:start]
-        self.bodies = {int(number): body for number, _, body, _ in entities}
-        self.kinds = {int(number): kind for number, kind, _, _ in entities if kind}
+        self.bodies: dict[int, str] = {int(number): body for number, _, body, _ in entities}
+        self.kinds: dict[int, str] = {int(number): kind for number, kind, _, _ in entities if kind}
         if len(self.bodies) < len(entities):
             raise ValueError("broken STEP text: two entities have one number")
         self.numbered: dict[str, list[int]] = {}
