@@ -44,9 +44,9 @@ def folders(
         write_ball(source, field)
     sample = Path(__file__).parents[3] / "docs" / "sample"
     changed = shutil.copytree(sample, tmp_path_factory.mktemp("changed") / "exports")
-    data = bytearray((changed / "mirrors.csv").read_bytes())
+    data = bytearray((changed / "design.json").read_bytes())
     data[len(data) // 2] ^= 1  # one bit: the size is right
-    (changed / "mirrors.csv").write_bytes(data)
+    (changed / "design.json").write_bytes(data)
     names = ("RECORD", "EXPORT", "SAMPLE", "CHANGED", "KNOT", "FIELD", "BALL")
     every = (record, export_with_wind_up, sample, changed, captured, field, ball)
     return dict(zip(names, map(str, every), strict=True))
