@@ -17,7 +17,7 @@ from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.capture.photograph import Sensor, count_pixels
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.options.builds import ToleranceOptions
-from tbcad.tolerancing.analysis import Analysis, ProcessOption
+from tbcad.tolerancing.analysis import NOT_SEARCHED, Analysis, ProcessOption
 from tbcad.tolerancing.margin import Margin
 from tbcad.tolerancing.montecarlo.builds import (
     MonteCarloCase,
@@ -133,7 +133,7 @@ class TestWords:
         assert "Margins needed for 99%: none found; none was found for fdm." in none
 
     def test_margins_that_were_not_searched_for(self, analysis: Analysis) -> None:
-        options = tuple(replace(option, margin=None) for option in PROCESS_OPTIONS)
+        options = tuple(replace(option, margin=NOT_SEARCHED) for option in PROCESS_OPTIONS)
         plain = replace(analysis, margin=None, process_options=options)
         said = summary_text(plain)
         assert "diamond 100.0%." in said
