@@ -177,6 +177,17 @@ def _draw_section(axes: "Axes", section: EdgeSection, ids: list[str]) -> None:
     _draw_outline(axes, section.points, low - 0.3)
     for mirror, place in zip(section.mirrors, section.apexes, strict=True):
         axes.annotate(ids[mirror], place, (0, 6), textcoords="offset points", ha="center")
+    for edge, side in zip(section.edges, ("right", "left"), strict=True):
+        axes.annotate(
+            f"{edge.depth:.2f} mm below the crests\n{edge.words}",
+            tuple(edge.bottom),
+            (25 if side == "right" else -25, -30),
+            textcoords="offset points",
+            ha=side,
+            va="top",
+            fontsize=9,
+            arrowprops={"arrowstyle": "-", "lw": 0.7},
+        )
     axes.set(xlabel="along the section, mm", ylabel=f"height, mm ({STRETCH:g} times stretched)")
     axes.set(aspect=STRETCH, ylim=(low - 1.1, section.points[:, 1].max() + 1.9))
     axes.set_title("Section of three mirrors through the camera's pinhole", fontsize=10)
@@ -192,7 +203,7 @@ def _draw_outline(axes: "Axes", points: Floats, low: float) -> None:
 
 def _draw_inset(axes: "Axes", section: EdgeSection) -> None:
     """One edge in its own scale."""
-    x, y = section.bottom(1)
+    x, y = section.edges[1].bottom
     inset = axes.inset_axes((0.3, 0.66, 0.4, 0.32))
     _draw_outline(inset, section.points, y - 2)
     inset.set(xlim=(x - INSET_MM, x + INSET_MM), ylim=(y - 0.15, y + 0.85), aspect="equal")

@@ -13,7 +13,7 @@ import pyvista
 from scipy.spatial import cKDTree
 
 from tbcad.cad.formats.checked_files import columns
-from tbcad.core.geometry.vectors import dot, unit
+from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
@@ -34,6 +34,9 @@ STRUCTURE_GREY = 205
 CORNER_TOLERANCE_MM = 0.01
 FACING_COS = 0.9
 TRIED = 8
+ON_MIRROR_MM = 0.005  # facets are nearer than this to the spheres
+SAME_MM = 0.02  # rims nearer than this are one edge
+ROUNDS = 20
 BEYOND = 0.35  # shown beyond the outer apices, of the distance of apices
 
 
@@ -125,18 +128,22 @@ def read_modelled(folder: Path, camera: str) -> tuple[Surfaces, Floats]:
 
 
 @dataclass(frozen=True)
+class Edge:
+    """Where a section passes from one mirror to the next."""
+
+    bottom: Floats  # lowest point, mm, (2,)
+    depth: float  # of it below the line over the crests of both mirrors, mm
+    words: str  # its shape
+
+
+@dataclass(frozen=True)
 class EdgeSection:
     """A section in its own plane: along it, and up toward the light."""
 
     mirrors: tuple[int, int, int]  # numbers of the three, from 0
     points: Floats  # of the outline, from one side to the other, mm, (p, 2)
     apexes: Floats  # of the mirrors, mm, (3, 2)
-
-    def bottom(self, edge: int) -> Floats:
-        """The lowest point of the first or second edge, 0 or 1, mm, (2,)."""
-        left, right = self.apexes[edge : edge + 2, 0]
-        between = self.points[(self.points[:, 0] > left) & (self.points[:, 0] < right)]
-        return np.asarray(between[between[:, 1].argmin()])
+    edges: tuple[Edge, Edge]  # between them
 
 
 def section_of(export: ExportedDesign, middle: int) -> EdgeSection:
@@ -155,7 +162,11 @@ def section_of(export: ExportedDesign, middle: int) -> EdgeSection:
     lines = np.asarray(cut.lines).reshape(-1, 3)[:, 1:]
     start = int(np.linalg.norm(place, axis=1).argmin())
     outline = _path(place @ frame.T, lines, start, reach)
-    return EdgeSection(mirrors, outline, apexes)
+    spheres, outer = reflector.mirrors.subset(np.array(mirrors)), outline @ frame + apex[middle]
+    height = norm(outer[None] - spheres.centre[:, None]) - spheres.radius[:, None]
+    on = np.abs(height) < ON_MIRROR_MM
+    edges = [_edge(outline, apexes[k : k + 2], on[k], on[k + 1]) for k in (0, 1)]
+    return EdgeSection(mirrors, outline, apexes, (edges[0], edges[1]))
 
 
 def _path(points: Floats, lines: Ints, start: int, reach: float) -> Floats:
@@ -186,6 +197,42 @@ def _opposite_neighbours(reflector: Reflector, mirror: int) -> tuple[int, int]:
     first, last = np.unravel_index((way @ way.T).argmin(), (len(near), len(near)))
     a, b = sorted((int(near[first]), int(near[last])))
     return a, b
+
+
+def _edge(outline: Floats, apexes: Floats, on_left: Bools, on_right: Bools) -> Edge:
+    number = np.arange(len(outline))
+    ends = [np.linalg.norm(outline - apex, axis=1).argmin() for apex in apexes]
+    between = number[ends[0] : ends[1]]
+    lowest = int(between[outline[between, 1].argmin()])
+    left = outline[number[on_left & (number <= lowest)].max()]
+    right = outline[number[on_right & (number >= lowest)].min()]
+    bottom = outline[lowest]
+    return Edge(bottom, _depth(outline, apexes, lowest), _words(outline, left, right, lowest))
+
+
+def _depth(outline: Floats, apexes: Floats, lowest: int) -> float:
+    """Depth of a point below the line that touches both mirrors, mm."""
+    bottom, slope = outline[lowest], 0.0
+    near = [
+        side[np.abs(side[:, 0] - apex[0]) < np.ptp(apexes[:, 0]) / 2]
+        for side, apex in zip((outline[:lowest], outline[lowest + 1 :]), apexes, strict=True)
+    ]
+    for _ in range(ROUNDS):  # the line's slope follows from the points that it touches
+        left, right = (side[(side[:, 1] - slope * side[:, 0]).argmax()] for side in near)
+        slope = float((right[1] - left[1]) / (right[0] - left[0]))
+    line = left[1] + slope * (bottom[0] - left[0])
+    return float((line - bottom[1]) / np.hypot(1, slope))
+
+
+def _words(outline: Floats, left: Floats, right: Floats, lowest: int) -> str:
+    """Width and depth of a groove between two rims, or the opening of a valley."""
+    width, bottom = float(np.linalg.norm(right - left)), outline[lowest]
+    if width > SAME_MM:
+        depth = min(left[1], right[1]) - bottom[1]
+        return f"groove {width:.2f} mm wide,\n{depth:.2f} mm deep"
+    ways = outline[[lowest - 1, lowest + 1]] - bottom
+    steep = np.arctan2(ways[:, 1], np.abs(ways[:, 0]))
+    return f"opening {180 - np.degrees(steep.sum()):.0f}°"
 
 
 if __name__ == "__main__":

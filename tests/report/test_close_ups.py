@@ -51,18 +51,23 @@ def test_a_valleys_bottom_is_on_both_spheres(shells: dict[str, ExportedDesign]) 
     valley = shells["valley"]
     section = section_of(valley, 40)
     mirrors = valley.reflectors[0].mirrors
-    for number in (0, 1):
+    for edge, pair in zip(section.edges, (section.mirrors[:2], section.mirrors[1:]), strict=True):
         # In the section's own plane, where a sphere is a circle about a point off the plane.
-        place = placed(valley, section.mirrors, section.bottom(number))
-        pair = list(section.mirrors[number : number + 2])
-        off = np.linalg.norm(place - mirrors.centre[pair], axis=1)
-        assert off == pytest.approx(1 / mirrors.curvature[pair], abs=FACETS_MM)
+        place = placed(valley, section.mirrors, edge.bottom)
+        off = np.linalg.norm(place - mirrors.centre[list(pair)], axis=1)
+        assert off == pytest.approx(1 / mirrors.curvature[list(pair)], abs=FACETS_MM)
+        assert "opening 1" in edge.words
+        assert edge.depth > 0.1
 
 
-def test_a_groove_is_deeper_than_a_valley(shells: dict[str, ExportedDesign]) -> None:
-    valley, pedestal = (section_of(shells[edges], 40) for edges in EDGES)
-    for number in (0, 1):
-        assert pedestal.bottom(number)[1] < valley.bottom(number)[1] - 3 * GROOVE
+def test_a_groove_is_as_wide_as_the_spec_has_it_and_deep(
+    shells: dict[str, ExportedDesign],
+) -> None:
+    valley, pedestal = (section_of(shells[edges], 40).edges for edges in EDGES)
+    for edge, other in zip(pedestal, valley, strict=True):
+        width = float(edge.words.split()[1])
+        assert GROOVE <= width < 2 * GROOVE
+        assert edge.depth > other.depth + 3 * GROOVE
 
 
 def placed(export: ExportedDesign, mirrors: tuple[int, int, int], point: np.ndarray) -> np.ndarray:

@@ -73,8 +73,8 @@ def calibrate(options: CalibrateOptions, json: JsonResult = False) -> int:
 def intrinsics(options: IntrinsicsOptions, json: JsonResult = False) -> int:
     """Solve the lens of a camera from photographs of a checkerboard or ChArUco board.
 
-    A ChArUco board may be partly out of the picture. Writes focal lengths, principal point and
-    distortion with their standard deviations, for tbcad calibrate --intrinsics.
+    Boards may be partly out of the picture. Writes focal lengths, principal point and distortion
+    with their standard deviations, for tbcad calibrate --intrinsics.
     """
     out, solved = Path(options.out), on_screen(1, "intrinsics", options)
     print_result(_lens_record(solved, out), _lens_lines(solved, out), json)
