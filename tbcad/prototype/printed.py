@@ -43,7 +43,7 @@ MAX_OVERHANG = np.cos(np.radians(45))  # of the downward part of a facet's norma
 # Base and caps turn, stage and frame are static; a tool is not in the assembly.
 Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
 VOLUME_ERROR = 1e-4
-LAYER_MM, INFILL = 0.2, 0.25
+LAYER_MM = 0.2
 SIDE_MM, FLAT_MM = 1.65, 1.0  # what is solid behind a wall, and below or above a flat face
 SUPPORT = 0.29  # share of the space below an overhang
 # mm^3 in a second, of walls, solid layers, infill and support; seconds more for each layer.
@@ -234,13 +234,13 @@ def _outward(body: Prism) -> Floats:
     return body.corners if np.cross(a, b) @ body.along > 0 else body.corners[::-1]
 
 
-def print_estimate(mesh: Mesh) -> tuple[float, float]:
+def print_estimate(mesh: Mesh, infill: float) -> tuple[float, float]:
     """Filament (mm^3), supports included, and hours, to print a mesh that stands on the bed.
 
     The print is by a 0.4 mm nozzle in layers of 0.2 mm: four perimeters, five layers at top and
-    bottom, 25 % of infill, support below 40 degrees. Thicknesses, shares and flows were fitted on
-    what PrusaSlicer 2.5 says of 29 printed parts of two designs, with its default speeds;
-    docs/prototype.md has the errors.
+    bottom, a share of infill, support below 40 degrees. Thicknesses and flows were fitted at 25 %
+    of infill on what PrusaSlicer 2.5 says of 29 printed parts of two designs, with its default
+    speeds; docs/prototype.md has the errors.
     """
     corners = mesh.vertices[mesh.triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
@@ -250,12 +250,12 @@ def print_estimate(mesh: Mesh) -> tuple[float, float]:
     flats = (area * np.abs(up))[np.abs(up) > FLAT].sum()
     solid = np.array([SIDE_MM * sides, FLAT_MM * flats])
     solid *= min(1.0, mesh.volume / solid.sum())
-    infill = INFILL * (mesh.volume - solid.sum())
+    inside = infill * (mesh.volume - solid.sum())
     heights = corners[..., 2]
     bottom = heights.min()
     over = (up < -OVERHANG) & (heights.max(axis=1) > bottom + TOUCHING_MM)
     columns = _room_below(corners, over, bottom)
-    volumes = np.array([*solid, infill, SUPPORT * float((-across[over, 2]) @ columns)])
+    volumes = np.array([*solid, inside, SUPPORT * float((-across[over, 2]) @ columns)])
     layers = (heights.max() - bottom) / LAYER_MM
     seconds = (volumes / FLOWS).sum() + layers * LAYER_S
     return float(volumes.sum()), float(seconds / HOUR_S)

@@ -13,7 +13,6 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.printed import (
     FLAT_MM,
     FLOWS,
-    INFILL,
     LAYER_S,
     NO_PADS,
     SIDE_MM,
@@ -25,6 +24,8 @@ from tbcad.prototype.printed import (
 )
 
 TILTED = unit(np.array([0.3, -0.5, 0.8]))
+
+INFILL = 0.25
 
 
 def cone(axis: np.ndarray, angle_deg: float, count: int = 12) -> np.ndarray:
@@ -79,13 +80,13 @@ def box(low: list[float], high: list[float]) -> trimesh.Trimesh:
 
 def test_a_thick_box_is_walls_and_infill_and_a_thin_wall_is_solid() -> None:
     """Cube of 40 mm: walls and solid layers by their areas, the rest a quarter; 200 layers."""
-    filament, hours = print_estimate(mesh(box([0, 0, 0], [40, 40, 40])))
+    filament, hours = print_estimate(mesh(box([0, 0, 0], [40, 40, 40])), INFILL)
     sides, flats = SIDE_MM * 4 * 1600, FLAT_MM * 2 * 1600
     infill = INFILL * (64000 - sides - flats)
     assert filament == pytest.approx(sides + flats + infill)
     seconds = sides / FLOWS[0] + flats / FLOWS[1] + infill / FLOWS[2] + 200 * LAYER_S
     assert hours == pytest.approx(seconds / 3600)
-    filament, _ = print_estimate(mesh(box([0, 0, 0], [2, 60, 80])))
+    filament, _ = print_estimate(mesh(box([0, 0, 0], [2, 60, 80])), INFILL)
     assert filament == pytest.approx(2 * 60 * 80)
 
 
@@ -103,10 +104,12 @@ def test_an_overhang_is_supported_down_to_what_is_below(filled: bool, room: floa
     """A roof 30 mm above the bed, beside a post, or above a block that leaves 10 mm below half."""
     bodies = [box([0, 0, 30], [40, 20, 32]), box([50, 0, 0], [60, 20, 32])]
     whole = mesh(*bodies, *[box([0, 0, 0], [20, 20, 20])] * filled)
-    assert print_estimate(whole)[0] - unsupported(whole) == pytest.approx(SUPPORT * room, rel=0.01)
+    assert print_estimate(whole, INFILL)[0] - unsupported(whole) == pytest.approx(
+        SUPPORT * room, rel=0.01
+    )
 
 
 def test_a_slope_of_45_degrees_needs_no_support() -> None:
     ends = [[x, y, z] for z, far in ((0, 10), (20, 30)) for x in (0, far) for y in (0, 20)]
     upright = mesh(trimesh.convex.convex_hull(ends))
-    assert print_estimate(upright)[0] == pytest.approx(unsupported(upright))
+    assert print_estimate(upright, INFILL)[0] == pytest.approx(unsupported(upright))

@@ -176,7 +176,7 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
                 verification(folder, progress=progress, cutter=cutter),
                 folder=out,
                 note=export.note,
-                as_made=simulated.result() if simulated else None,
+                as_made=_with_sag(simulated.result(), folder) if simulated else None,
             )
         progress("report")
         from tbcad.report.page.write import write_report
@@ -200,6 +200,24 @@ def _as_made(mirrors: MirrorDesign) -> AsMade:
     return as_made(reflectors(mirrors), mirrors.spec)
 
 
+def _with_sag(made: AsMade, folder: Path) -> AsMade:
+    """The same and how far a ball moves between two stops, where the build has a prototype.
+
+    What cannot be read the verification tells of; a rotary stage's own bearings no list does.
+    """
+    from tbcad.light.simulate.scene.reflector import read_export
+    from tbcad.records.prototype import NAME
+    from tbcad.rig.gravity.sag import build_sag
+
+    if not (folder / NAME).is_file():
+        return made
+    try:
+        sag = build_sag(read_export(folder))
+    except InputError:
+        return made
+    return replace(made, sag_mm=sag.between_stops(sag.whole))
+
+
 def as_made(
     exports: Path | str, progress: Progress = silent, detail: Progress = silent
 ) -> AsMade | None:
@@ -219,7 +237,7 @@ def as_made(
         export = read_export(folder)
     except InputError:  # the verification says what is wrong with it
         return None
-    return simulated(export.reflectors, export.spec, detail)
+    return _with_sag(simulated(export.reflectors, export.spec, detail), folder)
 
 
 @keywords(ReportOptions)

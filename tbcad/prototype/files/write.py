@@ -107,7 +107,7 @@ def _write_part(folder: Path, part: PrintedPart, spec: Spec) -> tuple[float, flo
     write_step(folder / f"{part.name}.step", solid, spec.step.pcurves, part.solid.properties)
     write_stl(folder / f"{part.name}.stl", mesh)
     write_3mf(folder / f"{part.name}.3mf", part.name, mesh)
-    return print_estimate(mesh)
+    return print_estimate(mesh, spec.printer.infill)
 
 
 def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: Prices) -> list[Row]:

@@ -101,6 +101,26 @@ def parts(
     return 0
 
 
+@app.command()
+def sag(
+    folder: Exports[Path],
+    json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
+) -> int:
+    """Show how far weight moves the balls of an export's prototype as its base turns.
+
+    Carrier, bearing head, shaft and uprights bend; modulus and infill are those of [printer]. What
+    is left is after a calibration that moves each stop's balls as one. Exit code 0, or 2 for bad
+    input.
+    """
+    check_is_export(folder)
+    from tbcad.light.simulate.scene.reflector import read_export
+    from tbcad.rig.gravity.sag import build_sag
+
+    found = build_sag(read_export(folder))
+    print_result(found.record(), found.lines(), json)
+    return 0
+
+
 OnlyOption = Annotated[list[str] | None, typer.Option("--only", metavar="PART")]
 """Draw this only, such as bearing_head or optical_layout; repeatable. By default everything."""
 
