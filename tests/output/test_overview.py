@@ -62,5 +62,5 @@ def test_a_prototype_that_cannot_be_made_is_left_out(tmp_path: Path) -> None:
 
 def test_a_mandrel_without_room_is_refused_before_a_build() -> None:
     settings = ["n=3", "shell.negative=true", "shell.wall_mm=50"]
-    with pytest.raises(InputError, match=r"mandrel has no room .* make shell\.wall_mm smaller"):
+    with pytest.raises(InputError, match=r"mandrel has no room .* shell\.wall_mm smaller"):
         overview(design(load_spec(None, settings)), [SHELL])

@@ -17,12 +17,11 @@ from tbcad.app.doctor import Finding
 from tbcad.common.results import Figure, Study
 from tbcad.common.screen import WIDTH, TimeLeft, stages
 from tests.exported_files import contents
-from tests.verify.synthetic_export import Design
-from tests.verify.synthetic_export import export as write_export
 
 SMALL = ["build", "--n", "4", "--set", "hfov_deg=120", "--parts", "shell"]
 # Longest that a command may go on after an interrupt, seconds: reading the files takes longer.
 PATIENCE_S = 20
+SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 
 
 @pytest.fixture(scope="module")
@@ -33,11 +32,6 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-@pytest.fixture(scope="module")
-def synthetic(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_export(tmp_path_factory.mktemp("output") / "x", Design())[0]
-
-
 def fits(text: str) -> list[str]:
     lines = text.splitlines()
     assert max(map(len, lines)) <= WIDTH, max(lines, key=len)
@@ -45,13 +39,14 @@ def fits(text: str) -> list[str]:
 
 
 def test_outputs_of_verify(
-    synthetic: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(synthetic.parent)
+    shutil.copytree(SAMPLE, tmp_path / "x")
+    monkeypatch.chdir(tmp_path)
     assert run(["verify", "x", "--quiet"]) == 0
     quiet = capsys.readouterr()
     assert quiet.err == ""
-    assert quiet.out == "PASS: as designed, 89 virtual cameras see 40 mm or more\n"
+    assert quiet.out == "PASS: as designed, 89 virtual cameras see 20 mm or more\n"
     assert run(["verify", "x", "--full"]) == 0
     full = capsys.readouterr().out
     assert quiet.out in full

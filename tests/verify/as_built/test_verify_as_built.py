@@ -194,7 +194,7 @@ def test_a_camera_that_looks_aside_fails(machine: Machine, judged: Judged) -> No
         (lambda m: m["angle_deg"].pop(), "another number of angles"),
         (lambda m: m.update(axis=[0, 0, 2]), "axis of another length"),
         (lambda m: m["camera"].update(focal_px=[0, 1]), "not above 0"),
-        (lambda m: m["spheres"][0].update(radius_mm=-1), "above 0"),
+        (lambda m: m["spheres"][0].update(radius_mm=-1), "greater than 0"),
         (lambda m: m["frames"].append(m["frames"][0]), "another number|a frame twice"),
         (lambda m: m["camera"]["axes"].reverse(), "axes that are no unit vectors"),
     ],

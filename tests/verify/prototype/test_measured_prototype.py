@@ -309,7 +309,8 @@ def test_a_step_file_is_held_against_the_mesh_in_its_place(
     with Processes(1, 60) as processes:
         files = read_step_files(context.export, processes)
     found = part_step_checks(context.export, masses, files)
-    assert {check.name for check in found if not check.passed} == wrong
+    # The synthetic prototype has no coupons.
+    assert {check.name for check in found if not check.passed} == wrong | {"coupons"}
 
 
 def test_one_broken_step_file_leaves_the_others_known(prototype_folder: Path) -> None:

@@ -49,10 +49,10 @@ def test_words_from_outside_are_no_markup() -> None:
 
 
 def test_absent_programs_are_skipped_in_so_many_words(
-    export_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    sample_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv("PATH", str(export_folder.parent))
-    assert main([str(export_folder), "--clients", "--full"]) == 0
+    monkeypatch.setenv("PATH", str(sample_folder.parent))
+    assert main([str(sample_folder), "--clients", "--full"]) == 0
     said = capsys.readouterr().out
     assert "not installed: apt install prusa-slicer" in said
     assert "questions to other programs skipped" in said

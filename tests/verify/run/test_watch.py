@@ -82,11 +82,10 @@ def test_results_add_up() -> None:
     titles: list[str] = []
     results = CollectedResults(progress=titles.append)
     column = np.array([1.0, np.nan, 0.1 + 0.2])
-    results.add(Results(stages=["s"], checks=[CHECK], prototype={"balls": []}))
+    results.add(Results(stages=["s"], checks=[CHECK]))
     results.add(Results(mirrors={"pixels": column}, printing=[{"part": "x"}], checks=[CHECK]))
     assert titles == results.stages == ["s"]
     assert results.checks == [CHECK, CHECK]
-    assert results.prototype == {"balls": []}
     assert results.printing == [{"part": "x"}]
     np.testing.assert_array_equal(results.mirrors["pixels"], column)
 

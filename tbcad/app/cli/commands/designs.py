@@ -135,8 +135,12 @@ def tolerance(
 
     Writes tolerance.json, which --json prints too, tables, notes and plots.
     """
+    from tbcad.app.api.verification import checked_process
+    from tbcad.app.api.verification import tolerance as analyse
     from tbcad.output.single_files import check_tables
 
+    if as_built is None:
+        checked_process(options)  # before heavy libraries are loaded
     check_tables(out)
     if as_built is not None:
         if options.process or options.margins or options.settings:
@@ -144,10 +148,6 @@ def tolerance(
                 "--as-built is about no process: leave out --process, --margins and --set"
             )
         return _as_built(options, as_built, out, json)
-    from tbcad.app.api.verification import checked_process
-    from tbcad.app.api.verification import tolerance as analyse
-
-    checked_process(options)  # before heavy libraries are loaded
     from tbcad.common.results import write_study
     from tbcad.tolerancing.report import json_text, summary_text, tolerance_study
 

@@ -18,9 +18,7 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export, reflectors
 from tbcad.light.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
-from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import draw
-from tbcad.tolerancing.montecarlo.edge_model import edge_model
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.montecarlo.sharpness import built_reflector
 from tests.exported_files import Rows, edit_csv, edit_json
@@ -195,7 +193,7 @@ def test_the_mesh_of_the_shell_shows_the_same(
         assert 200 * norm(turned).max() < 2e-3  # mm at the object
 
 
-def test_pixels_of_builds_are_those_of_the_fast_model(on_pedestals: Cameras) -> None:
+def test_walls_of_a_build_that_are_off_change_its_pictures(on_pedestals: Cameras) -> None:
     """Shells that are moved, turned and grown take their walls along; each wall is off as well."""
     errors = Errors(
         sphere_centre=Error(0.02),
@@ -208,13 +206,11 @@ def test_pixels_of_builds_are_those_of_the_fast_model(on_pedestals: Cameras) -> 
     at = on_pedestals[0]
     one = draw(errors, 5, range(1), len(at), None, len(at.walls))[0]
     moved = replace(one, wall=np.random.default_rng(3).normal(0, 0.2, one.wall.shape))
-    pixels = counted(built_reflector(at, moved, 0))
-    area = mirror_coverage(edge_model(at), moved).pixels[0]
     inside = within_frame(built_reflector(at, moved, 0))
     assert inside.sum() > 50
-    assert np.abs(area - pixels)[inside] == pytest.approx(0, abs=0.6 * np.sqrt(pixels.max()))
-    # Walls of the design would give other pictures.
-    assert np.abs(area - counted(built_reflector(at, one, 0)))[inside].max() > 30
+    pixels, others = (counted(built_reflector(at, drawn, 0)) for drawn in (moved, one))
+    off = np.abs(pixels - others)[inside]
+    assert 30 < off.max() < pixels.max()
 
 
 def test_the_record_gives_the_designs_rays(
