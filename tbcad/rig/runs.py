@@ -190,9 +190,8 @@ def export_digests(exports: Path, names: Iterable[str]) -> dict[str, str]:
 
 def check_same_export(folder: Path, record: RunRecord, exports: Path) -> None:
     """Refuse an export whose files are not those that a run began with; InputError: which."""
-    found = export_digests(exports, record.export_sha256)
     for name, digest in record.export_sha256.items():
-        if found[name] != digest:
+        if export_digests(exports, [name])[name] != digest:
             raise InputError(
                 f"{exports / name} is not the file that {folder} was photographed with: name the "
                 "export of that run"
