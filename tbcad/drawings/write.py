@@ -47,8 +47,6 @@ def write_drawings(
     names = _chosen(export, only)
     for name, suffix in product(names, SUFFIXES):
         check_file(out / f"{name}{suffix}", force)
-    with write_errors_as_input_errors(out):
-        out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="tbcad-drawings-") as place:
         work = partial(draw, export, Path(place))
         done = _results(work, names, progress, min(workers, len(names)))
@@ -56,6 +54,8 @@ def write_drawings(
         files = sorted(Path(place).iterdir())
         for file in files:
             check_file(out / file.name, force)
+        with write_errors_as_input_errors(out):
+            out.mkdir(parents=True, exist_ok=True)
         replace_files(out, {file.name: file.read_bytes() for file in files})
     return drawings
 
