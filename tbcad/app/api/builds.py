@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import nan
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -203,7 +204,8 @@ def _as_made(mirrors: MirrorDesign) -> AsMade:
 def _with_sag(made: AsMade, folder: Path) -> AsMade:
     """The same and how far a ball moves between two stops, where the build has a prototype.
 
-    What cannot be read the verification tells of; a rotary stage's own bearings no list does.
+    Not a number where it is not known: of a rotary stage's own bearings, or of files that cannot be
+    read, of which the verification tells.
     """
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.records.prototype import NAME
@@ -214,7 +216,7 @@ def _with_sag(made: AsMade, folder: Path) -> AsMade:
     try:
         sag = build_sag(read_export(folder))
     except InputError:
-        return made
+        return replace(made, sag_mm=nan)
     return replace(made, sag_mm=sag.between_stops(sag.whole))
 
 

@@ -6,6 +6,7 @@ The frame here is the base's at angle zero: x along the axis w, y at azimuth zer
 """
 
 import math
+import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from tbcad.core.geometry.rotations import rotated_about_x
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.output.manifest import read_manifest, written_file
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.tables import BallRow, StopRow
 from tbcad.rig.gravity.compliance import (
@@ -44,6 +46,7 @@ SECOND_MOMENT, TWIST_CONSTANT = 7.0e3, 1.5e3
 SCREW_MM, REACH_MM = 5.0, 10.0
 MPA_PER_GPA = 1e3
 UPRIGHTS, BEARINGS = ("upright_left", "upright_right"), ("bearing_front", "bearing_rear")
+MAX_MM = 5000.0  # of a body: none that a build has is as long
 X = np.array([1.0, 0.0, 0.0])
 LEFT = {"turn and run-out": [3, 1, 2], "six freedoms": [0, 1, 2, 3, 4, 5]}
 """Freedoms of `Sag.unmodelled` that a calibration may give to each stop."""
@@ -121,16 +124,17 @@ def build_sag(export: ExportedDesign) -> Sag:
             f"{folder / NAME}: the base turns on the drive's own bearings, whose stiffness no list "
             'gives: sag is computed for prototype.base.drive = "nema17-belt"'
         )
+    manifest = read_manifest(folder)
+    for name in (record.assembly.glb, BallRow.FILE, StopRow.FILE):
+        written_file(folder, manifest, name, Prototype.MISSING)
     axes = np.array([record.frame.axis, record.frame.zero, record.frame.third])
-    shown = read_glb(folder / record.assembly.glb)
-    solids = {
-        body.name: Trimesh(body.mesh.vertices @ axes.T, body.mesh.triangles) for body in shown
-    }
+    carrier_parts = [one.name for one in record.with_role("base") if one.name != "zero_disc"]
+    solids = read_solids(folder / record.assembly.glb, axes, carrier_parts)
     bodies = _bodies(BallRow.read(folder), axes, printer.density_g_cm3)
     angle, down = np.radians([row.base_angle_deg for row in StopRow.read(folder)]), -axes[:, 2]
     gravity = rotated_about_x(np.broadcast_to(down, (len(angle), 3)), -angle)
     material = Material(printer.modulus_gpa, printer.density_g_cm3, printer.infill)
-    pieces = [solids[part.name] for part in record.with_role("base") if part.name != "zero_disc"]
+    pieces = [solids[name] for name in carrier_parts]
     held = Axle(X * pieces[0].bounds[0, 0], X * solids["shaft"].bounds[1, 0], _shaft_radius(solids))
     carrier = sag_of_bodies(concatenate(pieces), bodies, held, material)
     load = axes @ np.array(record.drive.centre_mm), record.drive.mass_g
@@ -140,10 +144,20 @@ def build_sag(export: ExportedDesign) -> Sag:
     return Sag(angle, bodies.centre, axes, gravity, of)
 
 
-def _solids(path: Path, axes: Floats) -> dict[str, Trimesh]:
-    """All bodies of an assembly by name, in the frame with some axes as rows."""
-    shown = ((body.name, body.mesh) for body in read_glb(path))
-    return {name: Trimesh(mesh.vertices @ axes.T, mesh.triangles) for name, mesh in shown}
+def read_solids(path: Path, axes: Floats, carrier: list[str]) -> dict[str, Trimesh]:
+    """All bodies of an assembly by name, in the frame with some axes as rows.
+
+    InputError: it is no assembly, lacks a body, or is far too large to be one.
+    """
+    try:
+        shown = {body.name: body.mesh for body in read_glb(path)}
+    except (LookupError, ValueError, TypeError, AttributeError, OSError, struct.error):
+        raise InputError(f"{path} cannot be read: build the export again") from None
+    solids = {n: Trimesh(one.vertices @ axes.T, one.triangles) for n, one in shown.items()}
+    missing = {*carrier, "shaft", "bearing_head", *UPRIGHTS, *BEARINGS} - solids.keys()
+    if missing or max(np.ptp(one.bounds, axis=0).max() for one in solids.values()) > MAX_MM:
+        raise InputError(f"{path} is no assembly that tbcad wrote: build the export again")
+    return solids
 
 
 def _bodies(balls: list[BallRow], axes: Floats, density: float) -> Bodies:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 NOT_MODELLED = "lens 2 mm, shadows, caps"
@@ -29,13 +30,16 @@ class AsMade:
     # the largest coverage first; empty if they could not be simulated
     processes: tuple[ProcessYield, ...] = ()
     reason: str = ""  # why not
-    sag_mm: float | None = None  # of a ball between two stops; None without a prototype
+    # of a ball between two stops; None without a prototype, not a number where it is not known
+    sag_mm: float | None = None
 
     @property
     def left_out(self) -> str:
         """What no simulated build contains."""
-        sag = "" if self.sag_mm is None else f"sag {self.sag_mm:.2g} mm, "
-        return f"{sag}{NOT_MODELLED}"
+        if self.sag_mm is None:
+            return NOT_MODELLED
+        sag = "sag" if math.isnan(self.sag_mm) else f"sag {self.sag_mm:.2g} mm"
+        return f"{sag}, {NOT_MODELLED}"
 
 
 def enough_bad(builds: int) -> int:
