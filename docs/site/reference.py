@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import typer.main
 from pydantic import BaseModel
 from pydantic.json_schema import PydanticInvalidForJsonSchema
-from tbcad_verify.record.prototype_sections import PlateHoles
+from tbcad_verify.record.prototype import PlateHoles
 
 import tbcad
 from tbcad.app.cli.app import app

@@ -150,7 +150,7 @@ class VerificationOptions(Call):
     """Fail unless every part can be made by this printer: fdm, sls, sla, cnc, or a TOML file;
     repeatable."""
     clients: bool = False
-    """Also open the files in FreeCAD, gmsh, PrusaSlicer and admesh."""
+    """Also open the files in FreeCAD, gmsh and PrusaSlicer."""
     time_limit: Annotated[float, typer.Option(metavar="S")] = 600.0
     """Time limit for each stage, file or program, seconds."""
     strict: bool = False

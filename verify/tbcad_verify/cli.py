@@ -59,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--strict", action="store_true", help="fail also where lists or other paper were changed"
     )
     parser.add_argument(
-        "--clients", action="store_true", help="also ask FreeCAD, gmsh, PrusaSlicer and admesh"
+        "--clients", action="store_true", help="also ask FreeCAD, gmsh and PrusaSlicer"
     )
     parser.add_argument(
         "--as-built",

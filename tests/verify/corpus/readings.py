@@ -40,7 +40,7 @@ from tbcad_verify.prototype.light.ray_paths import ray_transfer
 from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
-from tbcad_verify.record.prototype_sections import Lamps
+from tbcad_verify.record.prototype import Lamps
 from tbcad_verify.run import stages
 from tbcad_verify.run import verify as verification
 from tbcad_verify.run.processes import Processes

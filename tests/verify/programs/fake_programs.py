@@ -24,22 +24,6 @@ G1 X0 Y0
 ; filament_diameter = 1.75
 """
 
-ADMESH = """
-========= Facet Status ========== Original ============ Final ====
-Number of facets                 :  1200                1200
-Facets with 1 disconnected edge  :     0                   0
-Total disconnected facets        :     0                   0
-=== Processing Statistics ===     ===== Other Statistics =====
-Number of parts       :     1        Volume   :  1000.250000
-Degenerate facets     :     0
-Edges fixed           :     0
-Facets removed        :     0
-Facets added          :     0
-Facets reversed       :     0
-Backwards edges       :     0
-Normals fixed         :     0
-"""
-
 GMSH = """
 from types import SimpleNamespace as Space
 def initialize(**options): print("chatter")
@@ -66,7 +50,6 @@ if "--output" in sys.argv:
 else:
     print({INFO!r})
 """,
-    "admesh": f"print({ADMESH!r})",
 }
 
 BAD = {

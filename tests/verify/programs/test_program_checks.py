@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 from tbcad_verify.programs import ExpectedPart, check_with_programs, is_skipped
-from tbcad_verify.programs.program_checks import QUERIES
+from tbcad_verify.programs.programs import QUERIES
 from tbcad_verify.report.checks import Check
 
-from tests.verify.programs.fake_programs import ADMESH, BAD, GOOD, INFO, SEEN, install, install_good
+from tests.verify.programs.fake_programs import BAD, GOOD, INFO, SEEN, install, install_good
 
 FILES = {"step": "part.step", "stl": "part.stl", "3mf": "part.3mf"}
 PART = ExpectedPart("part", FILES, spheres=7, volume=1000.0, volume_error=1.0)
@@ -72,7 +72,6 @@ def test_good_programs_pass(export: Path, programs: Path) -> None:
     free = [check.name for check in checks if check.limit is None]
     assert free == ["prusa filament", "prusa time"]
     assert figure(checks, "gmsh volume") == 0.25
-    assert figure(checks, "admesh volume") == 0.25
     assert figure(checks, "prusa slices") == pytest.approx(42 * math.pi * 1.75**2 / 4 - 100)
     assert figure(checks, "prusa filament") == 0.42
     assert figure(checks, "prusa time") == 26.5
@@ -132,43 +131,30 @@ def test_gmsh_counts_solids(export: Path, programs: Path) -> None:
     assert (figure(checks, "gmsh solids"), figure(checks, "gmsh spheres")) == (2, 7)
 
 
-REPORTS = {"prusa": ("prusa_slicer", INFO), "admesh": ("admesh", ADMESH)}
-
-
 @pytest.mark.parametrize(
-    ("program", "old", "new", "wrong"),
+    ("old", "new", "wrong"),
     [
-        ("prusa", "manifold = yes", "manifold = no\nopen_edges = 3", ["manifold"]),
-        ("prusa", "manifold = yes", "manifold = yes\nfacets_reversed = 2", ["manifold"]),
-        ("prusa", "manifold = yes", "manifold = yes\nedges_fixed = 1", ["manifold"]),
-        ("prusa", "parts =  1", "parts =  2", ["parts"]),
-        ("prusa", "volume = 1000.0", "volume = 1002.0", ["volume"]),
-        ("prusa", "volume = 1000.0", "volume = nan", ["volume"]),
-        ("prusa", "volume = 1000.0", f"volume = 500.0\n{INFO}", ["parts", "volume"]),
-        ("admesh", "facets        :     0  ", "facets        :     3  ", ["repairs"]),
-        ("admesh", "added          :     0", "added          :     1", ["repairs"]),
-        ("admesh", "edges       :     0", "edges       :     1", ["repairs"]),
-        ("admesh", "parts       :     1", "parts       :     2", ["parts"]),
-        ("admesh", "1000.250000", "-1000.250000", ["volume"]),
-        # without a figure all is unknown; admesh exits with 0 of a file that is no mesh
-        ("prusa", "manifold = yes", "", None),
-        ("prusa", "number_of_parts =  1", "", None),
-        ("prusa", "volume = 1000.0", "", None),
-        ("admesh", ADMESH, "ADMesh version 0.98.4", None),
+        ("manifold = yes", "manifold = no\nopen_edges = 3", ["manifold"]),
+        ("manifold = yes", "manifold = yes\nfacets_reversed = 2", ["manifold"]),
+        ("manifold = yes", "manifold = yes\nedges_fixed = 1", ["manifold"]),
+        ("parts =  1", "parts =  2", ["parts"]),
+        ("volume = 1000.0", "volume = 1002.0", ["volume"]),
+        ("volume = 1000.0", "volume = nan", ["volume"]),
+        ("volume = 1000.0", f"volume = 500.0\n{INFO}", ["parts", "volume"]),
+        # without a figure all is unknown
+        *((f"{key} = ", "", None) for key in ("manifold", "number_of_parts", "volume")),
     ],
 )
 def test_reports_of_meshes(
-    export: Path, programs: Path, program: str, old: str, new: str, wrong: list[str] | None
+    export: Path, programs: Path, old: str, new: str, wrong: list[str] | None
 ) -> None:
-    file, report = REPORTS[program]
-    assert old in report
-    install(programs, **{file: f"print({report.replace(old, new)!r})"})
-    checks = [check for check in ask(export) if check.name.startswith(program)]
+    assert old in INFO
+    install(programs, prusa_slicer=f"print({INFO.replace(old, new)!r})")
+    checks = [check for check in ask(export) if check.name.startswith("prusa")]
     if wrong is None:
         assert {check.passed for check in checks} == {None}
     else:
-        files = 2 if program == "prusa" else 1  # STL and 3MF
-        assert failed(checks) == [f"{program} {name}" for name in wrong] * files
+        assert failed(checks) == [f"prusa {name}" for name in wrong] * 2  # STL and 3MF
 
 
 def test_a_print_of_another_volume_fails(export: Path, programs: Path) -> None:
@@ -192,11 +178,11 @@ ECHO = "import sys; print(sys.argv[1:], open(sys.argv[-1]).read()); raise System
 def test_names_are_only_names(export: Path, programs: Path, name: str) -> None:
     """The program gets a copy, by an absolute path of our own."""
     (export / name).write_text("right file")
-    install(programs, admesh=ECHO)
+    install(programs, prusa_slicer=ECHO)
     checks = ask(export, replace(PART, files={"stl": name}))
-    answers = [c for c in checks if c.name.startswith("admesh")]
+    answers = [c for c in checks if c.name.startswith("prusa") and c.file == name]
     assert {(c.file, c.passed) for c in answers} == {(name, None)}
-    assert answers[0].detail == "gave up with exit status 9: ['./given.stl'] right file"
+    assert answers[0].detail.endswith("'--info', './given.stl'] right file")
 
 
 def test_the_export_and_the_home_stay_as_they_are(
@@ -215,7 +201,7 @@ for place in (".", os.environ["HOME"], os.environ.get("XDG_CONFIG_HOME", "."),
     open(os.path.join(place, "litter"), "w").write("litter")
 open(sys.argv[-1], "w").write("changed")
 """
-    install(programs, freecadcmd=writes, gmsh=writes, prusa_slicer=writes, admesh=writes)
+    install(programs, freecadcmd=writes, gmsh=writes, prusa_slicer=writes)
     before = {path: path.read_bytes() for path in export.iterdir()}
     ask(export)
     assert {path: path.read_bytes() for path in export.iterdir()} == before
@@ -262,7 +248,7 @@ def ctrl_c() -> None:
 def test_an_interrupt_does_not_wait(
     export: Path, programs: Path, event: Callable[[], None], error: type[BaseException]
 ) -> None:
-    install(programs, freecadcmd=BAD["hangs"], prusa_slicer=BAD["hangs"], admesh=BAD["hangs"])
+    install(programs, freecadcmd=BAD["hangs"], prusa_slicer=BAD["hangs"])
 
     def progress(stage: str) -> None:
         if stage == "prusa: part.stl":

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tbcad_verify.record.prototype_sections import PlacedFastener
+from tbcad_verify.record.prototype import PlacedFastener
 
 SCREW = {
     "name": "M5x16_1",

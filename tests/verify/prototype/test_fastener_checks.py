@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tbcad_verify.prototype.fastener_checks import faults_of, is_filled, size_of
-from tbcad_verify.record.prototype_sections import PlacedFastener
+from tbcad_verify.record.prototype import PlacedFastener
 from tbcad_verify.step.solids_text import RoundFace, TextSolid
 
 from tests.verify.prototype.screws import screw

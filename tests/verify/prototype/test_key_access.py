@@ -13,7 +13,7 @@ from tbcad_verify.prototype import key_access
 from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.key_access import HEAD_KEYS_MM, KEYS_MM, SET_KEYS_MM, key_of
-from tbcad_verify.record.prototype_sections import AssemblyStep, PlacedFastener
+from tbcad_verify.record.prototype import AssemblyStep, PlacedFastener
 from tbcad_verify.report.checks import check_names
 
 from tbcad.prototype.purchased.parts import load_parts

@@ -12,7 +12,7 @@ import numpy as np
 from tbcad_verify.printing.part_measures import PartMeasures, thin_area
 from tbcad_verify.printing.placement import SLACK_MM, BedPlacement, place, pose_text
 from tbcad_verify.printing.profile import Profile, load
-from tbcad_verify.record.prototype_sections import PrintedPart
+from tbcad_verify.record.prototype import PrintedPart
 from tbcad_verify.record.spec import PrinterSpec
 from tbcad_verify.report.checks import Check, CheckName, at_most, finite, informative, require
 from tbcad_verify.types import Floats

@@ -7,7 +7,7 @@ a copy of one file in a private folder. None of them sees the export itself.
 
 from __future__ import annotations
 
-from tbcad_verify.programs.program_checks import check_with_programs
 from tbcad_verify.programs.program_query import ExpectedPart, is_skipped
+from tbcad_verify.programs.programs import check_with_programs
 
 __all__ = ["ExpectedPart", "check_with_programs", "is_skipped"]

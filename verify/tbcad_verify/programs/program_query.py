@@ -132,16 +132,6 @@ def volume_check(check: CheckName, measured: float, part: ExpectedPart) -> Check
     return at_most(check, abs(measured - part.volume), part.volume_error, detail)
 
 
-def mesh_checks(
-    names: Sequence[CheckName], parts: float, volume: float, part: ExpectedPart
-) -> list[Check]:
-    """One part; the mesh's volume."""
-    return [
-        exactly(names[0], parts, 1, "must be one"),
-        volume_check(names[1], volume, part),
-    ]
-
-
 def solid_checks(
     names: Sequence[CheckName], figures: Mapping[str, float], part: ExpectedPart
 ) -> tuple[Check, Check, Check]:

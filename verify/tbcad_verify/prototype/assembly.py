@@ -19,8 +19,7 @@ from tbcad_verify.prototype.glb import read_glb
 from tbcad_verify.prototype.measured_parts import MeasuredPart, manifold
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
-from tbcad_verify.record.prototype import RECORD
-from tbcad_verify.record.prototype_sections import PrintedPart
+from tbcad_verify.record.prototype import RECORD, PrintedPart
 from tbcad_verify.report.checks import (
     Check,
     CheckName,

@@ -15,8 +15,7 @@ import numpy as np
 from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.fastener_checks import MOTOR_DEPTH_MM
-from tbcad_verify.record.prototype import GLB
-from tbcad_verify.record.prototype_sections import PlacedFastener
+from tbcad_verify.record.prototype import GLB, PlacedFastener
 from tbcad_verify.record.spec import BaseSpec
 from tbcad_verify.report.checks import Check, CheckName, at_most, informative, short_list
 from tbcad_verify.types import Floats

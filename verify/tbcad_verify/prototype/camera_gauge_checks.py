@@ -15,8 +15,7 @@ from tbcad_verify.mesh.vectors import distances_to_segments, unit
 from tbcad_verify.prototype.bodies import body_scene, placed_meshes
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
-from tbcad_verify.record.prototype import RECORD
-from tbcad_verify.record.prototype_sections import CameraPlace
+from tbcad_verify.record.prototype import RECORD, CameraPlace
 from tbcad_verify.report.checks import Check, CheckName, Unknown, informative, no_faults, require
 from tbcad_verify.types import Floats
 

@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.record.prototype import RECORD
-from tbcad_verify.record.prototype_sections import PlacedFastener
+from tbcad_verify.record.prototype import RECORD, PlacedFastener
 from tbcad_verify.report.checks import Check, CheckName, no_faults, short_list
 from tbcad_verify.step.solids_text import RoundFace, TextSolid, cross_length, distance_to_line
 from tbcad_verify.types import Floats

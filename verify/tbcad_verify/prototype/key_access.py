@@ -22,8 +22,7 @@ import numpy as np
 from tbcad_verify.prototype.assembly import Shape, closed_solid
 from tbcad_verify.prototype.bodies import turning
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.record.prototype import RECORD
-from tbcad_verify.record.prototype_sections import PlacedFastener
+from tbcad_verify.record.prototype import RECORD, PlacedFastener
 from tbcad_verify.report.checks import Check, CheckName, no_faults, short_list
 from tbcad_verify.types import Floats
 

@@ -19,7 +19,7 @@ from tbcad_verify.mesh.mesh import (
 from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.vectors import cross, distances_to_segments, dot, norm, unit
-from tbcad_verify.record.prototype_sections import PrintedPart
+from tbcad_verify.record.prototype import PrintedPart
 from tbcad_verify.report.checks import (
     Check,
     CheckName,

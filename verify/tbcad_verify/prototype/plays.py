@@ -69,14 +69,18 @@ def _hole_faults(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> 
 
 
 def _cup_faults(context: PrototypeContext, carriers: list[TextSolid]) -> Iterator[str]:
+    """Every ball has a cup about it, a hollow sphere as far from it as the spec asks for."""
     balls, asked = context.prototype.balls, context.export.spec.prototype.base.clearance_mm
-    centres = balls.columns("bx", 3).T
-    for face in (face for solid in carriers for face in solid.faces if face.kind == "sphere"):
-        away = np.linalg.norm(centres - face.point, axis=1)
-        k = int(away.argmin())
-        play = face.radius - float(balls.body_radius_mm[k])
-        if face.hollow and away[k] < SAME_MM and abs(play - asked) > SAME_MM:
-            yield f"the cup of ball {k + 1} is {play:.3f} mm from it, {asked:g} are asked for"
+    cups = [
+        face for solid in carriers for face in solid.faces if face.kind == "sphere" and face.hollow
+    ]
+    for k, centre in enumerate(balls.columns("bx", 3).T):
+        own = [face.radius for face in cups if np.linalg.norm(face.point - centre) < SAME_MM]
+        if not own:
+            yield f"the cup of ball {k + 1} is no sphere about it, and cannot be measured"
+        for play in np.subtract(own, balls.body_radius_mm[k]).tolist():
+            if abs(play - asked) > SAME_MM:
+                yield f"the cup of ball {k + 1} is {play:.3f} mm from it, {asked:g} are asked for"
 
 
 def _spigots(

@@ -10,7 +10,7 @@ import numpy as np
 from tbcad_verify.prototype.assembly import SINGLE_MM, VIEWS, Shape
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.cut_checks import SAME_MM, flat_drawing
-from tbcad_verify.record.prototype_sections import Panel, Shroud
+from tbcad_verify.record.prototype import Panel, Shroud
 from tbcad_verify.report.checks import Check, CheckName, at_most, no_faults, require
 from tbcad_verify.step.solids_text import TextSolid
 from tbcad_verify.types import Floats

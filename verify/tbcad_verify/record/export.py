@@ -25,8 +25,7 @@ from tbcad_verify.record.files import (
     refuse_unsafe,
 )
 from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.record.prototype import RECORD, Prototype, read_prototype
-from tbcad_verify.record.prototype_sections import PrintedPart
+from tbcad_verify.record.prototype import RECORD, PrintedPart, Prototype, read_prototype
 from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM, Spec
 from tbcad_verify.record.validation import (
     Name,

@@ -1,4 +1,4 @@
-"""prototype.json and its tables, validated strictly.
+"""prototype.json and its tables, validated strictly, with the fields that are used.
 
 A wrong form is refused here; wrong numbers are found by the checks.
 """
@@ -7,41 +7,28 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Self
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, field_validator, model_validator
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, read
-from tbcad_verify.record.prototype_sections import (
-    MOST,
-    Angle,
-    Assembly,
-    AssemblyStep,
-    Balls,
-    BoughtDrawing,
-    CameraPlace,
-    CapDrawing,
-    Drawing,
-    Home,
-    Lamps,
-    Led,
-    PlacedFastener,
-    Plan,
-    PlateHoles,
-    PrintedPart,
-    PurchasedBody,
-    Seat,
-    Shroud,
-    Stops,
-)
+from tbcad_verify.record.mirrors import WIDEST, Columns, Counts, column, numbers, numbers_or_empty
 from tbcad_verify.record.validation import (
+    FileOrNone,
+    Matrix,
     Name,
+    PartFiles,
+    PlainFile,
     Strict,
+    Vector,
     parse_json,
     shown,
     validated,
 )
+from tbcad_verify.types import Bools, Floats
 
 SCHEMA = "tbcad-prototype/2"
 RECORD, GLB = "prototype.json", "prototype.glb"
@@ -50,6 +37,250 @@ BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "ro
 SETTINGS = "grbl_settings.txt"
 KLIPPER, KLIPPER_CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"
 OPTIONAL = (PLATE_HOLES, KLIPPER, KLIPPER_CONFIG)
+MOST = 1000  # balls, parts or LEDs
+MOST_ROWS = 400_000
+LARGEST = 1e9
+
+Numbers = Annotated[Floats, numbers(-LARGEST, LARGEST)]
+Lengths = Annotated[Floats, numbers(1e-3, 1e4)]
+Angles = Annotated[Floats, numbers(-360, 360)]
+Masses = Annotated[Floats, numbers_or_empty(0, LARGEST)]
+Names = Annotated[NDArray[np.str_], column(Name, np.str_)]
+Kinds = Annotated[NDArray[np.str_], column(Literal["ball", "cap"], np.str_)]
+Angle = Annotated[float, Field(ge=-360, le=360)]
+
+
+class Balls(Columns):
+    """One ball or cap a row, K of them, with the base at angle zero."""
+
+    most_rows: ClassVar[int] = MOST
+
+    number: Counts
+    kind: Kinds
+    diameter_mm: Lengths
+    mass_g: Masses
+    radius_mm: Lengths
+    body_radius_mm: Lengths
+    polar_deg: Numbers
+    azimuth_deg: Numbers
+    px: Numbers
+    py: Numbers
+    pz: Numbers
+    nx: Numbers
+    ny: Numbers
+    nz: Numbers
+    cx: Numbers
+    cy: Numbers
+    cz: Numbers
+    bx: Numbers
+    by: Numbers
+    bz: Numbers
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if (wrong := np.flatnonzero(self.number != np.arange(1, len(self) + 1))).size:
+            raise ValueError(f"ball {wrong[0] + 1} must have number {wrong[0] + 1}")
+        return self
+
+    @property
+    def cap(self) -> Bools:
+        """(K,) true for caps."""
+        return np.asarray(self.kind == "cap")
+
+    def names(self, which: NDArray[np.integer]) -> list[str]:
+        """What reports call them."""
+        return [f"ball {k + 1}" for k in which.tolist()]
+
+
+class PlateHoles(Columns):
+    """plate_holes.csv: one tapped hole of the base plate a row."""
+
+    most_rows: ClassVar[int] = MOST
+
+    x_mm: Numbers
+    y_mm: Numbers
+
+
+class Plan(Columns):
+    """One mirror's picture a row, N of them; angles in degrees, numbers from 1."""
+
+    most_rows: ClassVar[int] = MOST_ROWS
+
+    order: Counts
+    turn: Angles = Field(alias="object_turn_deg")
+    stop: Counts
+    angle: Angles = Field(alias="base_angle_deg")
+    ball: Counts
+    mirror: Names
+
+
+class Stops(Columns):
+    """One stop of the base a row, S of them; angles in degrees, numbers from 1."""
+
+    most_rows: ClassVar[int] = MOST_ROWS
+
+    stop: Counts
+    angle: Angles = Field(alias="base_angle_deg")
+
+
+class Seat(Strict):
+    """The seat of a ball as recorded: where to begin looking for its pads."""
+
+    ball: int  # its number, from 1
+    axis: Vector  # (3,) unit, away from the light
+    normals: Matrix  # (3, 3) unit, of each pad, toward the ball's centre
+    contacts: Matrix = Field(alias="contacts_mm")  # (3, 3) mm, the pads' middles
+    pad: float = Field(alias="pad_diameter_mm", ge=1e-3, le=1e3)  # diameter of the pads, mm
+
+
+class PrintedPart(PartFiles):
+    """One part to be printed; y = x @ axes + origin lays it on the bed.
+
+    The meshes are on the bed, the STEP file has the solid in its place.
+    """
+
+    role: Literal["base", "cap", "stage", "frame", "tool"]  # what it is
+    finish: str | None = Field(max_length=WIDEST)  # of its surface; None: any
+    number: int | None = Field(alias="ball")  # of a cap, its ball's, from 1
+    axes: Matrix  # (3, 3)
+    origin: Vector = Field(alias="origin_mm")  # (3,) mm
+
+    @property
+    def ball(self) -> int:
+        """Of a cap, its ball from 0; else -1."""
+        return (self.number or 0) - 1
+
+
+class Led(Strict):
+    """A light-emitting diode of the stage: its position (3,) mm."""
+
+    name: Name
+    position: Vector = Field(alias="position_mm")
+
+
+class PurchasedBody(Strict):
+    """A purchased part, whose shape only the assembly has."""
+
+    name: Name  # of its body in the assembly
+    part: str | None  # name in the parts list; None for what the user has
+    turns: bool  # whether with the base
+    finish: str | None = Field(max_length=WIDEST)  # of its surface; None: as it is bought
+
+
+class Lamp(Strict):
+    """A lamp: the middle of its shining face (3,), mm, and the direction (3,) that it faces."""
+
+    name: Name
+    position: Vector = Field(alias="position_mm")
+    direction: Vector
+
+
+class Lamps(Strict):
+    """What lights the object."""
+
+    strip: str = Field(max_length=WIDEST)  # name of the LED strip in the parts list
+    strips: int = Field(ge=1, le=MOST)  # side by side on each lamp
+    length: float = Field(alias="length_mm", gt=0, le=LARGEST)  # of the strips, mm
+    # of all strips of a lamp side by side, mm
+    width: float = Field(alias="width_mm", gt=0, le=LARGEST)
+    level: bool  # whether they lie level, else they are upright
+    places: list[Lamp] = Field(min_length=1, max_length=MOST)  # of all lamps
+
+
+class Panel(Strict):
+    """A piece of card: its pattern's file, its width and height without flaps, mm."""
+
+    name: Name
+    dxf: FileOrNone
+    size: Annotated[list[float], Field(alias="size_mm", min_length=2, max_length=2)]
+
+
+class Shroud(Strict):
+    """The box round the rig."""
+
+    sheet: str = Field(max_length=WIDEST)
+    finish: str = Field(max_length=WIDEST)
+    panels: list[Panel] = Field(min_length=1, max_length=MOST)
+
+
+class PlacedFastener(Strict):
+    """A screw, washer, nut, insert, dowel, magnet or LED in its place."""
+
+    name: Name  # of its body in the assembly
+    part: str = Field(max_length=WIDEST)  # name in the parts list
+    # (3,) mm, the point of its axis from which its body goes along; of screws and washers on the
+    # face that they press on
+    position: Vector = Field(alias="position_mm")
+    along: Vector  # (3,) unit
+    # bodies that it goes through and into, in this order
+    through: list[Name] = Field(min_length=1, max_length=9)
+    turns: bool  # whether with the base
+    finish: str | None = Field(max_length=WIDEST)  # of its surface; None: as it is bought
+
+
+class AssemblyStep(Strict):
+    """A step of assembly."""
+
+    mounts: list[Name] = Field(max_length=MOST)  # names of the bodies and fasteners that it mounts
+
+
+class Drawing(Strict):
+    """Files of a drawing: what is cut by, and what is read."""
+
+    dxf: PlainFile
+    pdf: PlainFile
+
+
+class BoughtDrawing(Drawing):
+    """The drawing of a part, by its name in the parts list."""
+
+    part: str = Field(max_length=WIDEST)
+
+
+class CapDrawing(Drawing):
+    """The drawing of a cap, by the number of its ball."""
+
+    ball: int
+
+
+class Home(Strict):
+    """Base angles of homing in degrees, and the rod that fixes angle zero."""
+
+    switch: Angle = Field(alias="switch_deg")
+    homed: Angle = Field(alias="homed_deg")
+    travel: Annotated[float, Field(alias="travel_deg", ge=0, le=720)]
+    pin: str = Field(max_length=WIDEST)
+    # by which angle zero may be off, as the play of pin and key allows
+    zero_error: Annotated[float, Field(alias="zero_error_deg", ge=0, le=180)]
+
+
+class MarkPicture(Strict):
+    """The pair of marks of a picture, the base at an angle, degrees."""
+
+    base_angle_deg: Angle
+    side: Literal["positive", "negative"]
+
+
+class CameraPlace(Strict):
+    """How the camera is put in its place."""
+
+    # near and far mark of either side, at base angle zero, (2, 2, 3) mm
+    marks: list[list[Vector]] = Field(alias="marks_mm")
+    pictures: list[MarkPicture] = Field(min_length=1, max_length=99)  # of the marks
+
+    @field_validator("marks")
+    @classmethod
+    def _pairs(cls, marks: list[list[Floats]]) -> list[list[Floats]]:
+        if [len(side) for side in marks] != [2, 2]:
+            raise ValueError("marks must be a near and a far one on either side")
+        return marks
+
+
+class Assembly(Strict):
+    """Files of the whole; empty: none."""
+
+    step: FileOrNone = ""
+    glb: FileOrNone = ""
 
 
 class Prototype(Strict):

@@ -19,8 +19,7 @@ import numpy as np
 from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype.bodies import AssembledBodies, Bodies, some_angles, stage_bodies
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.record.prototype import GLB
-from tbcad_verify.record.prototype_sections import Lamps
+from tbcad_verify.record.prototype import GLB, Lamps
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
