@@ -294,7 +294,7 @@ def shorter_screws(some: list[dict[str, str]]) -> list[dict[str, str]]:
 Broken = dict[tuple[str, str], dict[str, tuple[Job, str]]]
 FAILING: Broken = {
     ("plan program", PROGRAM): {
-        "program: G92 X50": (text_of(PROGRAM, "G92 X.*", "G92 X50.0000"), "swing"),
+        "program: G92 X50": (text_of(PROGRAM, "G92 X.*", "G92 X50.0000"), "swing")
     },
     ("inventory", BOTH): {
         "a part not drawn": (undrawn("stage_post"), "stage_post is missing"),
@@ -319,7 +319,7 @@ FAILING: Broken = {
         "screws of the wheel once the base is on its shaft": (
             mounted_in("wheel", "shaft"),
             "behind bearing_head at every base angle",
-        ),
+        )
     },
     ("leds as designed", RECORD): {
         "an LED elsewhere": (at("leds/0/position_mm/0", plus(2.0)), "no pocket"),
@@ -334,7 +334,7 @@ FAILING: Broken = {
         "a lower floor of the object's room": (
             at(f"{SPEC}stage/top_mm", -21.0, DESIGN),
             "stage_disc",
-        ),
+        )
     },
     ("plays", DESIGN): {
         f"another {key}": (at(f"{SPEC}{key}", to, DESIGN), words)
@@ -349,10 +349,10 @@ FAILING: Broken = {
         "cups that are no spheres": (
             text_of("carrier.step", "SPHERICAL_SURFACE", "CYLINDRICAL_SURFACE"),
             "is no sphere about it",
-        ),
+        )
     },
     ("ball centres", DESIGN): {
-        "pads that are moved otherwise": (at(f"{SPEC}base/pad_offset_mm", 0.1, DESIGN), "um"),
+        "pads that are moved otherwise": (at(f"{SPEC}base/pad_offset_mm", 0.1, DESIGN), "um")
     },
     ("assembly step", BOTH): {
         "a plate of another size": (step_text(moved_point), "plate"),
@@ -450,7 +450,7 @@ FAILING: Broken = {
         "no caps": (at(f"{SPEC}caps", False, DESIGN), "caps without"),
     },
     ("printable", DESIGN): {
-        "a bed of 90 mm": (at("spec/printer/bed_mm", [90.0, 90.0, 90.0], DESIGN), "bed"),
+        "a bed of 90 mm": (at("spec/printer/bed_mm", [90.0, 90.0, 90.0], DESIGN), "bed")
     },
     ("camera mount", RECORD): {
         "camera: screws too short to move it": (at("fasteners", shorter_screws), "out_mm is"),
@@ -478,13 +478,11 @@ FAILING: Broken = {
         ),
     },
     ("cap tilt", STEP): {"cap: a spigot that is too thin": (spigot("cap_1", 1.0), "tilts")},
-    ("ball sizes", BALLS): {
-        "a cap of steel": (row(BALLS, 0, mass_g=9.0), "ball 1"),
-    },
+    ("ball sizes", BALLS): {"a cap of steel": (row(BALLS, 0, mass_g=9.0), "ball 1")},
     ("drive", BALLS): {"a heavy ball on the motor": (HEAVY, "the drive holds")},
     ("hold ratio", BALLS): {"a heavy ball on its magnet": (HEAVY, "ball")},
     ("power off", BALLS): {
-        "a heavy ball on the zero pin": (row(BALLS, -1, mass_g=1e6), "zero pin's pressure"),
+        "a heavy ball on the zero pin": (row(BALLS, -1, mass_g=1e6), "zero pin's pressure")
     },
     ("lamps", RECORD): {
         "lamps: one aside": (at(LAMP_X, plus(30.0)), "is drawn elsewhere"),
@@ -495,7 +493,7 @@ FAILING: Broken = {
         "lamps: one behind an upright": (drawn_away("upright_left", 60.0), "half turn"),
     },
     ("light paths, balls", GLB): {
-        "a lamp before the pinhole": (drawn_away("lamp_1", -23.0, -52.0, 35.0), "lamp_1"),
+        "a lamp before the pinhole": (drawn_away("lamp_1", -23.0, -52.0, 35.0), "lamp_1")
     },
     ("bodies apart", GLB): {
         "a washer in a web": (drawn_away("WASHER_5_9", 0, 2.0), "WASHER_5_9 and camera_bracket"),
@@ -580,7 +578,7 @@ UNSURE: Broken = {
         "a wheel of more teeth": (at("bought/wheel/part", "GT2-80"), "not 80 teeth"),
     },
     ("hold ratio", RECORD): {
-        "a smaller magnet": (at("fasteners/MAGNET/part", "MAGNET-4x3"), "its pocket is"),
+        "a smaller magnet": (at("fasteners/MAGNET/part", "MAGNET-4x3"), "its pocket is")
     },
     ("lamps", RECORD): {"lamps: another strip": (at("lamps/strip", "STRIP"), "STRIP is no strip")},
 }

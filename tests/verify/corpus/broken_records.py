@@ -310,11 +310,7 @@ RECORDS: tuple[Mutation, ...] = (
         ("a second target", second_key(JSON, "target_mm", "1.0"), "key target_mm is"),
         ("cut short", as_text(JSON, lambda b: b[: len(b) // 2]), JSON, "broken JSON"),
         ("not UTF-8", as_text(JSON, lambda b: b"\xff" + b), JSON, "UTF-8"),
-        (
-            "the version before",
-            top(schema="tbcad-design/1"),
-            "verifies tbcad-design/2",
-        ),
+        ("the version before", top(schema="tbcad-design/1"), "verifies tbcad-design/2"),
         ("a table outside", top(mirrors="../m.csv"), "../m.csv"),
         ("axes that are no axes", camera(forward=[0.0, 0.1, 1.0]), JSON, "forward and right"),
         ("a sensor without columns", camera(width_px=0), "width_px"),

@@ -32,7 +32,7 @@ from tbcad_verify.prototype import (
 from tbcad_verify.prototype import stages as prototype_stages
 from tbcad_verify.prototype.bodies import Bodies, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.control import gcode_checks, homing_checks, klipper_checks
+from tbcad_verify.prototype.control import homing_checks, program_checks
 from tbcad_verify.prototype.light import lamp_light
 from tbcad_verify.prototype.light.lamp_light import EdgedBodies
 from tbcad_verify.prototype.light.pinhole_cells import mirror_spheres
@@ -71,9 +71,8 @@ PURE: dict[Any, tuple[str, ...]] = {
     caps: ("fit_sphere",),
     cut_checks: ("read_dxf",),
     fastener_checks: ("_hole_spans",),
-    gcode_checks: ("run_program",),
     homing_checks: ("run_program",),
-    klipper_checks: ("run_klipper",),
+    program_checks: ("run_klipper", "run_program"),
     seats: ("_facets_near", "_pad", "distance_to_facets"),
 }
 

@@ -388,10 +388,7 @@ def export(folder: Path, spec: SyntheticPrototype) -> Path:
     mirrors = rows(design, record)
     found = document(design)
     found["spec"]["prototype"]["picture"] = "moved" if spec.moved else "fixed"
-    files = {
-        "mirrors.csv": table(mirrors),
-        "camera.json": b"for people",
-    }
+    files = {"mirrors.csv": table(mirrors), "camera.json": b"for people"}
     if spec.shell:
         a = solid(Cells(design, record))
         files |= {"shell_a.stl": stl(a), "shell_b.stl": stl(mirrored(a))}

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.control import homing_checks, klipper_checks
-from tbcad_verify.prototype.control.gcode_checks import deviations, homing
+from tbcad_verify.prototype.control import homing_checks, program_checks
 from tbcad_verify.prototype.control.gcode_machine import run_program
+from tbcad_verify.prototype.control.program_checks import deviations, homing
 from tbcad_verify.record.export import read_export
 
 from tbcad.core.spec.prototype import MotionSpec
@@ -66,8 +66,8 @@ def program_faults(context: PrototypeContext) -> Iterator[str]:
 FAULTS: dict[str, Callable[[PrototypeContext], Iterable[str]]] = {
     "program": program_faults,
     "settings": lambda context: homing_checks.settings_faults(context, DRIVE.ratio),
-    "klipper": klipper_checks.program_faults,
-    "klipper_config": lambda context: klipper_checks.config_faults(context, DRIVE.ratio),
+    "klipper": program_checks.klipper_faults,
+    "klipper_config": lambda context: program_checks.config_faults(context, DRIVE.ratio),
 }
 
 

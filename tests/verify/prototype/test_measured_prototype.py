@@ -19,11 +19,7 @@ from tbcad_verify.prototype.bodies import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.caps import measure_cap
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light import ball_views, pinhole_cells, ray_paths
-from tbcad_verify.prototype.measured_parts import (
-    MeasuredPart,
-    measure_part,
-    of_roles,
-)
+from tbcad_verify.prototype.measured_parts import MeasuredPart, measure_part, of_roles
 from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
 from tbcad_verify.report.checks import check_names

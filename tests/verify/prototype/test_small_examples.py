@@ -10,7 +10,7 @@ import pytest
 from ezdxf.document import Drawing
 from ezdxf.units import IN, MM
 from tbcad_verify.prototype.bodies import Bodies
-from tbcad_verify.prototype.flat_drawings import read_dxf
+from tbcad_verify.prototype.drawing_files import read_dxf
 from tbcad_verify.prototype.light.lamp_light import FACET_MM, EdgedBodies
 from tbcad_verify.prototype.light.pinhole_cells import (
     MAX_ANGLE,
@@ -78,12 +78,7 @@ class Edge:
 
 @pytest.mark.parametrize(
     ("y", "stopped"),
-    [
-        (-2.0, (False, False)),
-        (-0.9, (True, False)),
-        (0.9, (True, False)),
-        (2.0, (True, True)),
-    ],
+    [(-2.0, (False, False)), (-0.9, (True, False)), (0.9, (True, False)), (2.0, (True, True))],
 )
 def test_only_rays_near_an_edge_are_undecided(y: float, stopped: tuple[bool, bool]) -> None:
     starts = np.array([[100.0, y * FACET_MM, -50.0]])

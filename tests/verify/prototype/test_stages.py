@@ -28,13 +28,7 @@ from tests.verify.synthetic_export import sign
 Row = dict[str, Any]
 
 # Checks that are unknown where a ball's stop is, and where its place is.
-ON_STOPS = (
-    "cells",
-    "coverage, balls",
-    "light paths, balls",
-    "rays, balls",
-    "pixels, balls",
-)
+ON_STOPS = ("cells", "coverage, balls", "light paths, balls", "rays, balls", "pixels, balls")
 ON_BALLS = (*ON_STOPS, "swing", "swing clearance", "balls apart")
 
 
@@ -134,11 +128,7 @@ RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
     "apex off": (ball(1, lambda row: moved(row, "p", 1e-6)), ("ball positions",), "ball 1"),
     "larger than stock": (ball(1, lambda r: r.update(diameter_mm="10.1")), ("ball sizes",), "ball"),
     "without weight": (ball(1, lambda r: r.update(mass_g="0.001")), ("ball sizes",), "ball 1"),
-    "mirror missing in the plan": (
-        in_table(PLAN, row_of("a0007")),
-        ("plan", *ON_STOPS),
-        "a0007",
-    ),
+    "mirror missing in the plan": (in_table(PLAN, row_of("a0007")), ("plan", *ON_STOPS), "a0007"),
     "twin missing": (in_table(PLAN, row_of("b0007")), ("plan",), "b0007"),
     "twins exchanged": (in_table(PLAN, exchanged), ("plan",), "b0007"),
     "angle off": (in_table(PLAN, nudged(ANGLE, 1e-3)), ("plan",), "row 4"),
@@ -196,11 +186,7 @@ PROTOTYPES: dict[str, tuple[SyntheticPrototype, tuple[str, ...], str]] = {
         "blocked by",
     ),
     "motor where the base swings": (Made(motor=BAR), ("swing",), "motor"),
-    "a ball drawn elsewhere": (
-        Made(drawn_off={"ball_1": 0.5}),
-        ("bodies apart",),
-        "ball_1",
-    ),
+    "a ball drawn elsewhere": (Made(drawn_off={"ball_1": 0.5}), ("bodies apart",), "ball_1"),
     "a leaf that no printer of filament makes": (
         Made(more={"leaf": ("frame", [200, 200, 0], [200.5, 230, 30])}),
         ("printable",),

@@ -148,10 +148,7 @@ def test_listed_but_missing_and_unlisted_files(export_folder: Path) -> None:
 
 @pytest.mark.parametrize("lost", [False, True])
 def test_changed_paper_is_told_and_fails_only_strictly(
-    export_folder: Path,
-    shell_report: Report,
-    capsys: pytest.CaptureFixture[str],
-    lost: bool,
+    export_folder: Path, shell_report: Report, capsys: pytest.CaptureFixture[str], lost: bool
 ) -> None:
     (export_folder / "camera.json").write_text("mine", encoding="utf-8")
     if lost:

@@ -41,11 +41,7 @@ def checks(
     if gauge is None:
         raise Unknown(f"there is no {GAUGE}")
     given = context, place, gauge
-    faults = [
-        *_mark_faults(*given),
-        *_sight_faults(*given, parts),
-        *_room_faults(*given, parts),
-    ]
+    faults = [*_mark_faults(*given), *_sight_faults(*given, parts), *_room_faults(*given, parts)]
     return [no_faults(names[0], faults)]
 
 
@@ -79,10 +75,7 @@ def _turned(context: PrototypeContext, angle_deg: float, points: Floats) -> Floa
 
 
 def _sight_faults(
-    context: PrototypeContext,
-    place: CameraPlace,
-    gauge: MeasuredPart,
-    parts: list[MeasuredPart],
+    context: PrototypeContext, place: CameraPlace, gauge: MeasuredPart, parts: list[MeasuredPart]
 ) -> Iterator[str]:
     """Rays beside the marks meet near and far arm first, or nothing."""
     own, base, still = (
@@ -124,10 +117,7 @@ def _rays(context: PrototypeContext, marks: Floats) -> tuple[Floats, Floats]:
 
 
 def _room_faults(
-    context: PrototypeContext,
-    place: CameraPlace,
-    gauge: MeasuredPart,
-    parts: list[MeasuredPart],
+    context: PrototypeContext, place: CameraPlace, gauge: MeasuredPart, parts: list[MeasuredPart]
 ) -> Iterator[str]:
     """The gauge sits on the hub, clear of balls, and turns past the frame."""
     import manifold3d

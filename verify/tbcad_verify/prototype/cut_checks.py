@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.flat_drawings import FlatDrawing, read_dxf
-from tbcad_verify.prototype.sheets import sheet_faults
+from tbcad_verify.prototype.drawing_files import FlatDrawing, read_dxf, sheet_faults
 from tbcad_verify.record.files import MAX_TEXT_BYTES, read
 from tbcad_verify.record.prototype import PLATE_HOLES
 from tbcad_verify.report.checks import Check, CheckName, no_faults, require

@@ -36,10 +36,7 @@ IN_PLATE_MM = (4.2,)
 IN_PRINTED_MM = (2.0, 2.8, 3.4, 4.5, 5.5, 6.6)
 # Drawn without holes: bodies of catalogue parts.
 SOLID = frozenset(
-    {
-        *("motor", "rotary_stage", "rotary_stage_top", "camera"),
-        *("upright_left", "upright_right"),
-    }
+    {*("motor", "rotary_stage", "rotary_stage_top", "camera"), *("upright_left", "upright_right")}
 )
 # Smallest grip in nominal diameters: in an insert or aluminium; in a steel nut (thin, ISO 4035).
 GRIP, GRIP_NUT = 1.0, 0.5
@@ -198,10 +195,7 @@ def _holds(one: PlacedFastener, face: RoundFace, others: list[RoundFace]) -> boo
 
 
 def _grips(
-    one: PlacedFastener,
-    size: Size,
-    others: list[PlacedFastener],
-    solids: Mapping[str, TextSolid],
+    one: PlacedFastener, size: Size, others: list[PlacedFastener], solids: Mapping[str, TextSolid]
 ) -> bool:
     """Whether a screw is long enough in insert, nut, thread or motor."""
     last = one.through[-1]

@@ -17,14 +17,7 @@ from scipy.special import ellipe
 
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.prototype import RECORD
-from tbcad_verify.report.checks import (
-    Check,
-    CheckName,
-    Unknown,
-    at_least,
-    require,
-    worst_offenders,
-)
+from tbcad_verify.report.checks import Check, CheckName, Unknown, at_least, require, worst_offenders
 from tbcad_verify.step.solids_text import TextSolid, distance_to_line
 from tbcad_verify.types import Floats
 

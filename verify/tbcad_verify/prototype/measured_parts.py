@@ -18,7 +18,7 @@ from tbcad_verify.mesh.mesh import (
 )
 from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, measure_edges
 from tbcad_verify.mesh.stl import Facets
-from tbcad_verify.mesh.vectors import cross, distances_to_segments, dot, norm, unit
+from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.record.prototype import PrintedPart
 from tbcad_verify.report.checks import (
     Check,
@@ -31,7 +31,7 @@ from tbcad_verify.report.checks import (
     unknown,
 )
 from tbcad_verify.shell.integrity import FOLDS, TOPOLOGY, fold_check, mesh_checks
-from tbcad_verify.types import Floats, Ints
+from tbcad_verify.types import Floats
 
 ROTATION = 1e-9  # largest deviation of the axes from a rotation
 BED_MM = 0.05
@@ -112,25 +112,6 @@ def pose_checks(names: list[CheckName], part: PrintedPart, mesh: Mesh) -> list[C
 def of_roles(parts: list[MeasuredPart], *roles: str) -> list[MeasuredPart]:
     """The parts of some roles."""
     return [part for part in parts if part.part.role in roles]
-
-
-def distance_to_facets(point: Floats, mesh: Mesh, facets: Ints) -> float:
-    """Minimum distance of a point (3,) from some facets of a mesh, mm; infinite without any.
-
-    Facets without area are left out: their edges are their neighbours' too.
-    """
-    solid = facets[norm(mesh.area[:, facets]) > 0]
-    normal, corner = (
-        unit(mesh.area[:, solid]),
-        mesh.points[mesh.faces[solid]].T - point[:, None, None],
-    )
-    distance, above = np.full(solid.size, np.inf), np.ones(solid.size, dtype=np.bool_)
-    for k in range(3):
-        start, end = corner[:, k], corner[:, (k + 1) % 3]
-        above &= dot(cross(normal, end - start), start) <= 0
-        distance = np.minimum(distance, distances_to_segments(np.zeros((3, 1)), start, end))
-    distance[above] = np.abs(dot(normal, corner[:, 0]))[above]
-    return float(distance.min(initial=np.inf))
 
 
 def manifold(points: Floats, faces: Any) -> Any:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.vectors import dot, norm, polar_and_azimuth, unit, wrapped
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.control.gcode_checks import program_check
+from tbcad_verify.prototype.control.program_checks import program_check
 from tbcad_verify.record.poses import POSE_MM
 from tbcad_verify.record.prototype import BALLS, PLAN, PROGRAM
 from tbcad_verify.report.checks import (

@@ -9,9 +9,8 @@ import numpy as np
 
 from tbcad_verify.mesh.mesh import Mesh, connected_groups
 from tbcad_verify.mesh.segments import half_edge_vectors
-from tbcad_verify.mesh.vectors import distances_to_segments, dot, norm, rotation_angles, unit
+from tbcad_verify.mesh.vectors import cross, distances_to_segments, dot, norm, rotation_angles, unit
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.measured_parts import distance_to_facets
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -36,12 +35,7 @@ SEARCH_MM = 2.0  # beyond the ball, in which facets are searched
 MIN_DETERMINANT = 1e-3  # of the pads' normals, for the planes to meet in a point
 LISTED = 3  # balls without three pads
 FILE = ("base",)
-CHECKS = {
-    "ball centres": "um",
-    "pads": "mm",
-    "balls clear": "mm",
-    "ball clearance": "mm",
-}
+CHECKS = {"ball centres": "um", "pads": "mm", "balls clear": "mm", "ball clearance": "mm"}
 
 
 Boxes = tuple[Floats, Floats]
@@ -198,3 +192,22 @@ def _margin(mesh: Mesh, pad: Pad, centre: Floats) -> float:
     distance = float(distances_to_segments(x, start, start + edge).min())
     turns = rotation_angles(normal, start - x, start + edge - x).sum() / (2 * np.pi)
     return (distance if abs(turns) > 0.5 else -distance) - INSIDE * radius
+
+
+def distance_to_facets(point: Floats, mesh: Mesh, facets: Ints) -> float:
+    """Minimum distance of a point (3,) from some facets of a mesh, mm; infinite without any.
+
+    Facets without area are left out: their edges are their neighbours' too.
+    """
+    solid = facets[norm(mesh.area[:, facets]) > 0]
+    normal, corner = (
+        unit(mesh.area[:, solid]),
+        mesh.points[mesh.faces[solid]].T - point[:, None, None],
+    )
+    distance, above = np.full(solid.size, np.inf), np.ones(solid.size, dtype=np.bool_)
+    for k in range(3):
+        start, end = corner[:, k], corner[:, (k + 1) % 3]
+        above &= dot(cross(normal, end - start), start) <= 0
+        distance = np.minimum(distance, distances_to_segments(np.zeros((3, 1)), start, end))
+    distance[above] = np.abs(dot(normal, corner[:, 0]))[above]
+    return float(distance.min(initial=np.inf))

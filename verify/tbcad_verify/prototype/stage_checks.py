@@ -22,11 +22,7 @@ from tbcad_verify.report.checks import (
 from tbcad_verify.types import Bools, Floats
 
 FILE = ("stage", "frame")
-CHECKS = {
-    "object room": "mm^3",
-    "leds seen": "LEDs",
-    "leds inside": "outside the capture sphere",
-}
+CHECKS = {"object room": "mm^3", "leds seen": "LEDs", "leds inside": "outside the capture sphere"}
 NEEDED = 2  # LEDs, for the three coordinates of a centre
 ROOM_MM3 = 0.1  # of parts in the room: facets of the arms' rounding
 LIFT_MM = 0.01  # of the room above the disc

@@ -27,16 +27,8 @@ from tbcad_verify.prototype.assembly import (
 from tbcad_verify.prototype.bodies import AssembledBodies, MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.caps import MeasuredCap, measure_cap
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.light.ball_views import (
-    BallViews,
-    ball_views,
-    pixel_rays,
-)
-from tbcad_verify.prototype.measured_parts import (
-    MeasuredPart,
-    measure_part,
-    of_roles,
-)
+from tbcad_verify.prototype.light.ball_views import BallViews, ball_views, pixel_rays
+from tbcad_verify.prototype.measured_parts import MeasuredPart, measure_part, of_roles
 from tbcad_verify.prototype.seats import MeasuredSeat, measure_seats
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.prototype import Prototype

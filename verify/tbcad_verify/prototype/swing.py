@@ -13,13 +13,7 @@ from scipy.spatial import cKDTree
 from tbcad_verify.prototype.bodies import MeasuredPrototype, turning
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import PLACED
-from tbcad_verify.report.checks import (
-    Check,
-    CheckName,
-    at_most,
-    informative,
-    short_list,
-)
+from tbcad_verify.report.checks import Check, CheckName, at_most, informative, short_list
 from tbcad_verify.types import Floats
 
 SEARCH_MM = 8.0  # larger clearances are all reported as this

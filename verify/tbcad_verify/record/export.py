@@ -27,14 +27,7 @@ from tbcad_verify.record.files import (
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.prototype import RECORD, PrintedPart, Prototype, read_prototype
 from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM, Spec
-from tbcad_verify.record.validation import (
-    Name,
-    PartFiles,
-    Strict,
-    Vector,
-    parse_json,
-    validated,
-)
+from tbcad_verify.record.validation import Name, PartFiles, Strict, Vector, parse_json, validated
 from tbcad_verify.types import Floats
 
 SCHEMA, MANIFEST_SCHEMA = "tbcad-design/2", "tbcad-manifest/1"

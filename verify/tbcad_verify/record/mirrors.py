@@ -111,10 +111,7 @@ def numbers_or_empty(least: float, most: float) -> Any:
     return column(Annotated[cell, empty], float)
 
 
-Counts = Annotated[
-    Ints,
-    column(Annotated[str, Field(pattern="^[0-9]{1,9}$")], np.int64),
-]
+Counts = Annotated[Ints, column(Annotated[str, Field(pattern="^[0-9]{1,9}$")], np.int64)]
 Texts = Annotated[NDArray[np.str_], column(Annotated[str, Field(max_length=WIDEST)], np.str_)]
 
 

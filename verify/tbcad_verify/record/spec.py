@@ -35,10 +35,9 @@ class OpticsSpec(Strict):
     ] = Field(strict=False)
     semi_minor_mm: float = Field(ge=1, le=5000)
     # Exports of before this key have no stretch.
-    stretch: tuple[
-        Annotated[float, Field(ge=0.5, le=2)],
-        Annotated[float, Field(ge=0.5, le=2)],
-    ] = Field((1.0, 1.0), strict=False)
+    stretch: tuple[Annotated[float, Field(ge=0.5, le=2)], Annotated[float, Field(ge=0.5, le=2)]] = (
+        Field((1.0, 1.0), strict=False)
+    )
 
 
 class CameraSpec(Strict):

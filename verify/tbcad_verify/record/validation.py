@@ -30,11 +30,7 @@ class Strict(BaseModel):
     """An object of a JSON file: no conversions, finite numbers, other keys ignored."""
 
     model_config = ConfigDict(
-        frozen=True,
-        strict=True,
-        extra="ignore",
-        allow_inf_nan=False,
-        arbitrary_types_allowed=True,
+        frozen=True, strict=True, extra="ignore", allow_inf_nan=False, arbitrary_types_allowed=True
     )
 
 

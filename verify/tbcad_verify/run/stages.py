@@ -34,12 +34,7 @@ from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import MirrorChecks, Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
 from tbcad_verify.shell.cutter import fillet_checks
-from tbcad_verify.shell.integrity import (
-    MANIFEST,
-    manifest_checks,
-    mesh_ends_checks,
-    record_checks,
-)
+from tbcad_verify.shell.integrity import MANIFEST, manifest_checks, mesh_ends_checks, record_checks
 from tbcad_verify.shell.mandrel import mandrel_results
 from tbcad_verify.shell.measured_shell import ShellPart, flipped_measures, measure_shells
 from tbcad_verify.shell.mesh_casing import casing_checks, casing_names
@@ -189,11 +184,7 @@ def _shell_measures(
 
 
 def _verify_prototype(
-    export: Export,
-    facets: list[Facets],
-    profiles: list[Profile],
-    required: bool,
-    sink: ResultSink,
+    export: Export, facets: list[Facets], profiles: list[Profile], required: bool, sink: ResultSink
 ) -> None:
     if export.prototype is None:
         return

@@ -70,9 +70,7 @@ class VerifyOptions:
 
 
 def verify(
-    folder: Path,
-    progress: Progress = lambda _: None,
-    options: VerifyOptions = VerifyOptions(),
+    folder: Path, progress: Progress = lambda _: None, options: VerifyOptions = VerifyOptions()
 ) -> Report:
     """Verify an export, and write verify.json into it.
 

@@ -20,8 +20,7 @@ from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import chunks, dot, unit
 from tbcad_verify.record.export import Export, Mandrel
-from tbcad_verify.record.flange_holes import HoleLimits
-from tbcad_verify.record.mandrel_holes import blind_hole_faults
+from tbcad_verify.record.flange_holes import HoleLimits, blind_hole_faults
 from tbcad_verify.report.checks import (
     Check,
     CheckName,

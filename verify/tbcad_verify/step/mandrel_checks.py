@@ -9,8 +9,7 @@ import numpy as np
 
 from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.record.export import Export, Mandrel
-from tbcad_verify.record.flange_holes import Hole, HoleLimits, X, Z
-from tbcad_verify.record.mandrel_holes import blind_hole_faults
+from tbcad_verify.record.flange_holes import Hole, HoleLimits, X, Z, blind_hole_faults
 from tbcad_verify.report.checks import (
     Check,
     CheckName,

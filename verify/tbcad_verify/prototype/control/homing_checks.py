@@ -13,8 +13,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.control.gcode_checks import PULL_OFF_DEG, homing
 from tbcad_verify.prototype.control.gcode_machine import run_program
+from tbcad_verify.prototype.control.program_checks import PULL_OFF_DEG, homing
 from tbcad_verify.prototype.drive_checks import FULL_STEPS, gear_of
 from tbcad_verify.record.prototype import SETTINGS
 from tbcad_verify.report.checks import Check, CheckName, Unknown, no_faults, require

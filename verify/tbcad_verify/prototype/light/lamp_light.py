@@ -20,14 +20,7 @@ from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype.bodies import AssembledBodies, Bodies, some_angles, stage_bodies
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.record.prototype import GLB, Lamps
-from tbcad_verify.report.checks import (
-    Check,
-    CheckName,
-    Unknown,
-    at_most,
-    informative,
-    no_faults,
-)
+from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, informative, no_faults
 from tbcad_verify.step.solids_text import TextSolid
 from tbcad_verify.types import Bools, Floats
 
