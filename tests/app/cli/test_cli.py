@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from tbcad_verify.report.summary import MAX_LINES
+from tbcad_verify.report.text import MAX_LINES
 
 from tbcad.app.cli import run
 from tbcad.app.cli.endings import signals_as_interrupt

@@ -34,9 +34,9 @@ from tbcad_verify.prototype.bodies import Bodies, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control import homing_checks, program_checks
 from tbcad_verify.prototype.light import lamp_light
+from tbcad_verify.prototype.light.ball_views import ray_transfer
 from tbcad_verify.prototype.light.lamp_light import EdgedBodies
 from tbcad_verify.prototype.light.pinhole_cells import mirror_spheres
-from tbcad_verify.prototype.light.ray_paths import ray_transfer
 from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes

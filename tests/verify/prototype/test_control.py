@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +15,6 @@ import pytest
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control import homing_checks, program_checks
 from tbcad_verify.prototype.control.gcode_machine import run_program
-from tbcad_verify.prototype.control.program_checks import deviations, homing
 from tbcad_verify.record.export import read_export
 
 from tbcad.core.spec.prototype import MotionSpec
@@ -58,13 +57,8 @@ def context(synthetic_prototype: Path) -> PrototypeContext:
     return PrototypeContext(export, record.model_copy(update=texts))
 
 
-def program_faults(context: PrototypeContext) -> Iterator[str]:
-    machine = run_program(context.prototype.program, *homing(context))
-    yield from [*machine.faults, *deviations(context, machine)]
-
-
 FAULTS: dict[str, Callable[[PrototypeContext], Iterable[str]]] = {
-    "program": program_faults,
+    "program": program_checks.program_faults,
     "settings": lambda context: homing_checks.settings_faults(context, DRIVE.ratio),
     "klipper": program_checks.klipper_faults,
     "klipper_config": lambda context: program_checks.config_faults(context, DRIVE.ratio),

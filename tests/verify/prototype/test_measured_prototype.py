@@ -18,7 +18,7 @@ from tbcad_verify.prototype.assembly import assembly_meshes, part_step_checks
 from tbcad_verify.prototype.bodies import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.caps import measure_cap
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.light import ball_views, pinhole_cells, ray_paths
+from tbcad_verify.prototype.light import ball_views, pinhole_cells
 from tbcad_verify.prototype.measured_parts import MeasuredPart, measure_part, of_roles
 from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
@@ -175,7 +175,7 @@ def test_the_window_goes_along_with_its_ball(
     context: PrototypeContext, measured: MeasuredPrototype
 ) -> None:
     """Each mirror's middle is moved to its ball's apex, which shows the origin."""
-    transfer = ray_paths.ray_transfer(measured)
+    transfer = ball_views.ray_transfer(measured)
     shell = pinhole_cells.mirror_spheres(context)
     chief = pinhole_cells.cell_outlines(shell).chief
     _, lines = transfer.reflected(np.arange(chief.shape[1]), chief)
@@ -194,7 +194,7 @@ def test_coverage_by_rays_on_a_fine_outline(
     """One mirror by a plain loop over many directions, its ball turned and not the rays."""
     shown = ball_views.ball_views(measured, ball_views.pixel_rays(measured))
     edge = pinhole_cells.cell_outlines(pinhole_cells.mirror_spheres(context))
-    transfer = ray_paths.ray_transfer(measured)
+    transfer = ball_views.ray_transfer(measured)
     for i in (5, 20, 40):
         ball, angle = int(context.ball[i]), float(np.degrees(context.angle[i]))
         sphere = make_balls(SyntheticPrototype())[ball]

@@ -28,8 +28,7 @@ from tbcad_verify.report.methods import (
     remedy_by_name,
 )
 from tbcad_verify.report.report import Output, Report
-from tbcad_verify.report.summary import MAX_LINES
-from tbcad_verify.report.text import WIDTH
+from tbcad_verify.report.text import MAX_LINES, WIDTH
 
 from tests.verify.synthetic_export import Design, export
 

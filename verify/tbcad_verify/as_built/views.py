@@ -17,9 +17,8 @@ from tbcad_verify.mesh.surfaces import (
 )
 from tbcad_verify.mesh.vectors import cross, dot, nearest_on_lines, norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.light.ball_views import ended_on_balls, outline_coverage
+from tbcad_verify.prototype.light.ball_views import ended_on_balls, outline_coverage, rotated
 from tbcad_verify.prototype.light.pinhole_cells import MirrorSpheres, cell_outlines
-from tbcad_verify.prototype.light.ray_paths import rotated
 from tbcad_verify.record.poses import ON_SEAM
 from tbcad_verify.types import Bools, Floats, Ints
 

@@ -17,22 +17,12 @@ from pathlib import Path
 from typing import Any
 
 from tbcad_verify.record.files import locate
-from tbcad_verify.report.checks import (
-    Check,
-    CheckName,
-    Unknown,
-    at_most,
-    check_names,
-    exactly,
-    informative,
-    unknown,
-)
+from tbcad_verify.report.checks import Check, CheckName, Unknown, check_names, informative
 from tbcad_verify.run.child import Limits, Outcome, run
 
 Command = tuple[str, ...]  # a program's absolute path and first arguments; empty: it is absent
 SKIPPED = "skipped: "
 NO_ANSWER = "ended without error, but left no readable answer"
-SOLID, SPHERES, VOLUME = "solids", "faces", "mm^3 off"
 # The end of our scripts inside programs. They define `look`, which returns figures, and `message`.
 SCRIPT_END = """
 try:
@@ -122,32 +112,6 @@ def skipped(check: CheckName, reason: str) -> Check:
 def is_skipped(check: Check) -> bool:
     """Whether `skipped` made it: it should not be shown like a pass."""
     return check.measured is None and check.detail.startswith(SKIPPED)
-
-
-def volume_check(check: CheckName, measured: float, part: ExpectedPart) -> Check:
-    """A check that a volume, mm^3, is the same as the mesh's."""
-    if not math.isfinite(part.volume + part.volume_error):
-        return unknown(check, "the mesh's volume is unknown")
-    detail = f"{measured:.6g} mm^3, but the mesh has {part.volume:.6g}"
-    return at_most(check, abs(measured - part.volume), part.volume_error, detail)
-
-
-def solid_checks(
-    names: Sequence[CheckName], figures: Mapping[str, float], part: ExpectedPart
-) -> tuple[Check, Check, Check]:
-    """One solid; every mirror a face on an exact sphere, and nothing else; the mesh's volume.
-
-    `figures`: of solids, spheres and volume.
-    """
-    solids, spheres, volume = names
-    count = figures["spheres"]
-    return (
-        exactly(solids, figures["solids"], 1, "must be one"),
-        informative(spheres, count, "no mirrors: any number is allowed")
-        if part.spheres is None
-        else exactly(spheres, count, part.spheres, "spherical faces, unlike the mirrors"),
-        volume_check(volume, figures["volume"], part),
-    )
 
 
 def text_of(outcome: Outcome) -> str:

@@ -10,16 +10,13 @@ import importlib.util
 import math
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import partial
 from pathlib import Path
 
 from tbcad_verify.programs.program_query import (
     SCRIPT_END,
-    SOLID,
-    SPHERES,
-    VOLUME,
     Command,
     ExpectedPart,
     ProgramQuery,
@@ -28,9 +25,7 @@ from tbcad_verify.programs.program_query import (
     sandbox,
     script_figures,
     skipped,
-    solid_checks,
     text_of,
-    volume_check,
 )
 from tbcad_verify.record.files import open_folder
 from tbcad_verify.report.checks import (
@@ -47,6 +42,7 @@ from tbcad_verify.run.child import Limits
 from tbcad_verify.types import Progress
 
 PROCESSES = 2
+SOLID, SPHERES, VOLUME = "solids", "faces", "mm^3 off"
 INSTALL_PRUSA = "apt install prusa-slicer"
 GMSH_KEYS = ("solids", "spheres", "volume")
 
@@ -99,6 +95,32 @@ def message(error):
 """
 
 
+def volume_check(check: CheckName, measured: float, part: ExpectedPart) -> Check:
+    """A check that a volume, mm^3, is the same as the mesh's."""
+    if not math.isfinite(part.volume + part.volume_error):
+        return unknown(check, "the mesh's volume is unknown")
+    detail = f"{measured:.6g} mm^3, but the mesh has {part.volume:.6g}"
+    return at_most(check, abs(measured - part.volume), part.volume_error, detail)
+
+
+def solid_checks(
+    names: Sequence[CheckName], figures: Mapping[str, float], part: ExpectedPart
+) -> list[Check]:
+    """One solid; every mirror a face on an exact sphere, and nothing else; the mesh's volume.
+
+    `figures`: of solids, spheres and volume.
+    """
+    solids, spheres, volume = names
+    count = figures["spheres"]
+    return [
+        exactly(solids, figures["solids"], 1, "must be one"),
+        informative(spheres, count, "no mirrors: any number is allowed")
+        if part.spheres is None
+        else exactly(spheres, count, part.spheres, "spherical faces, unlike the mirrors"),
+        volume_check(volume, figures["volume"], part),
+    ]
+
+
 def find_gmsh() -> Command:
     """Python with the package's file; the program alone does not tell what faces are."""
     spec = importlib.util.find_spec("gmsh") if sys.executable else None
@@ -114,7 +136,7 @@ def ask_gmsh(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -
     Unknown: the package gives no answer.
     """
     figures = script_figures(sandbox.run(), sandbox.folder, GMSH_KEYS)
-    return list(solid_checks(names, figures, expected))
+    return solid_checks(names, figures, expected)
 
 
 GMSH = ProgramQuery(
@@ -185,24 +207,17 @@ PROFILE = (
 )
 
 
-def find_prusa() -> Command:
-    """The program, by either of its names."""
-    return on_path("prusa-slicer", "PrusaSlicer")
-
-
 def ask_info(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName]) -> list[Check]:
     """Manifold without repair, one part, the mesh's volume.
 
     Unknown: the program gives no answer.
     """
-    lines = _lines(
-        text_of(sandbox.run("--datadir", sandbox.folder / "home", "--info", sandbox.copy))
-    )
-    parts, volume = (_required(lines, key) for key in ("number_of_parts", "volume"))
+    outcome = sandbox.run("--datadir", sandbox.folder / "home", "--info", sandbox.copy)
+    values = _values(text_of(outcome))
     return [
-        _manifold(names[0], lines),
-        exactly(names[1], parts, 1, "must be one"),
-        volume_check(names[2], volume, expected),
+        _manifold(names[0], values),
+        exactly(names[1], _sum(values, "number_of_parts"), 1, "must be one"),
+        volume_check(names[2], _sum(values, "volume"), expected),
     ]
 
 
@@ -212,7 +227,10 @@ def ask_slices(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName])
     Unknown: the program gives no answer.
     """
     slices, filament, time = names
-    length, hours = _sliced(sandbox)
+    code = sandbox.folder / "sliced.gcode"
+    data = ("--datadir", sandbox.folder / "home")
+    text_of(sandbox.run(*data, "--export-gcode", *PROFILE, "--output", code, sandbox.copy))
+    length, hours = _print(_tail(code))
     return [
         _slices(slices, length, expected.volume),
         informative(filament, length / 1e3),
@@ -220,39 +238,30 @@ def ask_slices(sandbox: Sandbox, expected: ExpectedPart, names: list[CheckName])
     ]
 
 
-def _sliced(sandbox: Sandbox) -> tuple[float, float]:
-    """Length of filament, mm, and time, h, of a solid print."""
-    code = sandbox.folder / "sliced.gcode"
-    data = ("--datadir", sandbox.folder / "home")
-    text_of(sandbox.run(*data, "--export-gcode", *PROFILE, "--output", code, sandbox.copy))
-    return _print(_tail(code))
+def _values(text: str) -> dict[str, list[str]]:
+    """Values by key, one for each object of the file."""
+    found: dict[str, list[str]] = {}
+    for key, value in re.findall(r"^(\w{1,40}) = +?(\S{1,40}) *$", text, flags=re.MULTILINE):
+        found.setdefault(key, []).append(value)
+    return found
 
 
-def _lines(text: str) -> list[tuple[str, str]]:
-    """Key and value of every line; keys repeat for each object of the file."""
-    return re.findall(r"^(\w{1,40}) = +?(\S{1,40}) *$", text, flags=re.MULTILINE)
-
-
-def _manifold(name: CheckName, lines: list[tuple[str, str]]) -> Check:
-    verdicts = [value for key, value in lines if key == "manifold"]
+def _manifold(name: CheckName, values: dict[str, list[str]]) -> Check:
+    verdicts = values.get("manifold", [])
     if not verdicts or {*verdicts} - {"yes", "no"}:
         raise Unknown("ended without error, but did not say whether the mesh is manifold")
-    repairs = {key: _sum(lines, key) for key in REPAIRS if any(one == key for one, _ in lines)}
+    repairs = {key: _sum(values, key) for key in REPAIRS if key in values}
     flaws = verdicts.count("no") + sum(map(abs, repairs.values()))
     named = ", ".join(f"{key} {count:.0f}" for key, count in repairs.items())
     detail = f"manifold: {', '.join(verdicts)}; {named or 'no repairs'}"
     return at_most(name, flaws, 0, detail)
 
 
-def _required(lines: list[tuple[str, str]], key: str) -> float:
-    if not any(name == key for name, _ in lines):
+def _sum(values: dict[str, list[str]], key: str) -> float:
+    if key not in values:
         raise Unknown(f"ended without error, but did not say its {key}")
-    return _sum(lines, key)
-
-
-def _sum(lines: list[tuple[str, str]], key: str) -> float:
     try:
-        return sum([float(value) for name, value in lines if name == key]) + 0.0
+        return sum(map(float, values[key]))
     except ValueError as error:
         raise Unknown(f"ended without error, but its {key} is no number") from error
 
@@ -284,9 +293,12 @@ def _print(code: str) -> tuple[float, float]:
     return float(length[1]), sum(int(count) * HOURS[unit] for count, unit in spans)
 
 
+PRUSA = partial(on_path, "prusa-slicer", "PrusaSlicer")
+
+
 def _info(kind: str) -> ProgramQuery:
     questions = {"prusa manifold": "flaws", "prusa parts": "parts", "prusa volume": VOLUME}
-    return ProgramQuery("prusa", kind, INSTALL_PRUSA, questions, find_prusa, ask_info)
+    return ProgramQuery("prusa", kind, INSTALL_PRUSA, questions, PRUSA, ask_info)
 
 
 PRUSA_STL = _info("stl")
@@ -296,7 +308,7 @@ PRUSA_SLICES = ProgramQuery(
     kind="stl",
     install=INSTALL_PRUSA,
     questions={"prusa slices": "%", "prusa filament": "m", "prusa time": "h"},
-    find=find_prusa,
+    find=PRUSA,
     ask=ask_slices,
 )
 QUERIES = (FREECAD, GMSH, PRUSA_STL, PRUSA_3MF, PRUSA_SLICES)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.vectors import dot, norm, polar_and_azimuth, unit, wrapped
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.control.program_checks import program_check
+from tbcad_verify.prototype.control.program_checks import program_faults
 from tbcad_verify.record.poses import POSE_MM
 from tbcad_verify.record.prototype import BALLS, PLAN, PROGRAM
 from tbcad_verify.report.checks import (
@@ -31,18 +31,17 @@ CHECKS = (
     ("plan program", PROGRAM, "faults"),
 )
 
+Faults = Callable[[PrototypeContext], Iterator[str]]
+
 
 def checks(context: PrototypeContext) -> list[Check]:
     """Balls against the design; plan, stops and program against mirrors, balls and each other."""
-    return guarded_each(CHECKS, (_positions, _sizes, _plan, program_check), context)
 
+    def counting(faults: Faults) -> Callable[[CheckName], Check]:
+        return lambda name: no_faults(name, faults(context))
 
-def _sizes(name: CheckName, context: PrototypeContext) -> Check:
-    return no_faults(name, _size_faults(context))
-
-
-def _plan(name: CheckName, context: PrototypeContext) -> Check:
-    return no_faults(name, _plan_faults(context))
+    counted = map(counting, (_size_faults, _plan_faults, program_faults))
+    return guarded_each(CHECKS, (lambda name: _positions(name, context), *counted))
 
 
 def _positions(name: CheckName, context: PrototypeContext) -> Check:

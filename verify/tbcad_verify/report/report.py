@@ -18,13 +18,13 @@ from tbcad_verify.record.poses import virtual_cameras
 from tbcad_verify.report.as_made import AsMade
 from tbcad_verify.report.checks import Check, finite
 from tbcad_verify.report.methods import key_figures, remedy
-from tbcad_verify.report.summary import summary
 from tbcad_verify.report.text import (
     WIDTH,
     changed_files,
     changed_lines,
     listed_names,
     printer_lines,
+    summary,
     table,
 )
 from tbcad_verify.types import Floats

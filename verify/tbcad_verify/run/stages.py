@@ -131,7 +131,10 @@ def _verify_shells(
 
     sink(Results(stages=[PRINTABILITY]))
     measured: dict[str, PartMeasures] = {}
-    first, _ = attempt(partial(_scene_of_original, shells))
+    # The scene of a shell whose image is another: one for its walls and for all light.
+    has_image = any(shell.image_of for shell in shells)
+    mesh = shells[0].mesh if has_image else None
+    first = attempt(partial(build_scene, mesh))[0] if mesh else None
     for shell in shells:
         measures, lost = attempt(partial(_shell_measures, shell, measured, first))
         if measures:
@@ -139,8 +142,7 @@ def _verify_shells(
         _assess_printing(shell.part.stl, measures, lost, profiles, required, sink)
     if shells:
         holes = {name: measures.holes for name, measures in measured.items()}
-        setup, no_setup = _trace_shells(export, shells, first, holes, sink)
-        known = partial(require, setup, no_setup)
+        known = _trace_shells(export, shells, first, holes, sink)
         if cutter_mm is not None:
             names = [("fillet width", part.stl, "um") for part in export.parts]
             fillets = guarded(names, lambda: fillet_checks(known(), cutter_mm))
@@ -161,12 +163,6 @@ def _verify_mandrels(
     sink(Results(stages=[MANDRELS]))
     for mandrel, stl in zip(export.mandrels, facets, strict=True):
         sink(mandrel_results(export, mandrel, stl, setup, cutter_mm))
-
-
-def _scene_of_original(shells: list[ShellPart]) -> RayScene | None:
-    """The scene of a shell whose image is another: one for its walls and for all light."""
-    has_image = any(shell.image_of for shell in shells)
-    return build_scene(shells[0].mesh) if has_image and shells[0].mesh else None
 
 
 def _shell_measures(
@@ -250,8 +246,11 @@ def _trace_shells(
     first: RayScene | None,
     holes: Mapping[str, RoundHoles],
     sink: ResultSink,
-) -> tuple[OpticalSetup | None, str]:
-    """The optical stages: mirrors against the record, the casing, coverage, and every pixel."""
+) -> Callable[[], OpticalSetup]:
+    """The optical stages: mirrors against the record, the casing, coverage, and every pixel.
+
+    Returns the setup, or raises Unknown.
+    """
     files = ", ".join(part.stl for part in export.parts)
 
     def report(units: Mapping[str, str], work: Callable[[], MirrorChecks]) -> None:
@@ -262,18 +261,16 @@ def _trace_shells(
 
     sink(Results(stages=[SETUP]))
     setup, no_setup = attempt(lambda: _set_up(export, shells, first))
-    report(mirrors_found.CHECKS, lambda: mirrors_found.checks(require(setup, no_setup), files))
-    casing = guarded(casing_names(export), lambda: casing_checks(require(setup, no_setup), holes))
+    known = partial(require, setup, no_setup)
+    report(mirrors_found.CHECKS, lambda: mirrors_found.checks(known(), files))
+    casing = guarded(casing_names(export), lambda: casing_checks(known(), holes))
     sink(Results(checks=casing))
     sink(Results(stages=[COVERAGE]))
-    covered, lost = attempt(lambda: coverage.measure(require(setup, no_setup)))
-    report(
-        coverage.CHECKS,
-        lambda: coverage.checks(require(setup, no_setup), require(covered, lost), files),
-    )
+    covered, lost = attempt(lambda: coverage.measure(known()))
+    report(coverage.CHECKS, lambda: coverage.checks(known(), require(covered, lost), files))
     sink(Results(stages=[PIXELS]))
-    report(pixels.CHECKS, lambda: pixels.checks(require(setup, no_setup), covered, files))
-    return setup, no_setup
+    report(pixels.CHECKS, lambda: pixels.checks(known(), covered, files))
+    return known
 
 
 def _set_up(export: Export, shells: list[ShellPart], first: RayScene | None) -> OpticalSetup:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -167,20 +166,19 @@ def _read_steps(export: Export, processes: Processes) -> Steps:
 
 
 def _compare_steps(export: Export, results: CollectedResults, steps: Callable[[], Steps]) -> None:
-    wait = cache(steps)
     if any(part.step for part in export.parts):
         results.add(Results(stages=["STEP"]))
-        _, comparisons, _, areas = wait()
+        _, comparisons, _, areas = steps()
         coverage = results.mirrors.get("coverage_fitted_mm")
         checks = shell_step_checks(export, results.masses, comparisons, coverage, areas)
         results.add(Results(checks=checks))
     if any(part.step for part in export.mandrels):
         results.add(Results(stages=["STEP of the mandrels"]))
-        _, _, mandrels, _ = wait()
+        _, _, mandrels, _ = steps()
         results.add(Results(checks=mandrel_step_checks(export, results.masses, mandrels)))
     if any(part.step for part in export.printed):
         results.add(Results(stages=["STEP of the prototype"]))
-        files, _, _, _ = wait()
+        files, _, _, _ = steps()
         results.add(Results(checks=part_step_checks(export, results.masses, files)))
 
 
