@@ -6,9 +6,9 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.verify.corpus.copies import change, put
+from tests.verify.corpus.copies import put
 from tests.verify.corpus.facets import MODEL, edit_3mf, zipped
-from tests.verify.corpus.mutation import Job, Mutation, failing, refusing
+from tests.verify.corpus.mutation import Job, Mutation, as_bytes, failing, refusing, together
 
 NAME = "shell_a.3mf"
 PLACE = "built once where it stands"
@@ -26,10 +26,6 @@ BOMB = 100_000_000  # bytes of zeros, which pack to a thousandth
 def text(how: Callable[[str], str]) -> Job:
     """Change the model's text."""
     return lambda folder: edit_3mf(folder, NAME, how)
-
-
-def data(how: Callable[[bytes], bytes]) -> Job:
-    return lambda folder: change(folder, NAME, how)
 
 
 def members(how: Callable[[dict[str, bytes]], dict[str, bytes]]) -> Job:
@@ -97,17 +93,15 @@ def bomb(found: dict[str, bytes]) -> dict[str, bytes]:
     return {**found, MODEL: b" " * BOMB}
 
 
-def liar(folder: Path) -> None:
-    """The same, and its directory says that it unpacks to next to nothing."""
-    members(bomb)(folder)
-    change(folder, NAME, lambda b: b.replace(BOMB.to_bytes(4, "little"), b"\x10\0\0\0"))
-
-
 def renamed(data: bytes) -> bytes:
     """The directory has the model's name, the member itself another; some programs read that."""
     return data.replace(b"3D/3dmodel.model", b"3D/3dmodel.modem", 1)
 
 
+# A bomb whose directory says that it unpacks to next to nothing.
+LIAR = together(
+    members(bomb), as_bytes(NAME, lambda b: b.replace(BOMB.to_bytes(4, "little"), b"\x10\0\0\0"))
+)
 AS_IS, INCHES = "1 0 0 0 1 0 0 0 1 0 0 0", "25.4 0 0 0 25.4 0 0 0 25.4 0 0 0"
 ASIDE, MIRRORED = "1 0 0 0 1 0 0 0 1 10 0 0", "-1 0 0 0 1 0 0 0 1 0 0 0"
 THREEMFS: tuple[Mutation, ...] = (
@@ -120,12 +114,12 @@ THREEMFS: tuple[Mutation, ...] = (
     *refusing(
         "3MF",
         ("inches", swapped('"millimeter"', '"inch"'), NAME, "millimetres"),
-        ("cut short", data(lambda b: b[: len(b) // 2]), NAME, "zip"),
-        ("no zip", data(lambda _: b"solid" * 100), NAME, "zip"),
-        ("empty", data(lambda _: b""), NAME, "zip"),
+        ("cut short", as_bytes(NAME, lambda b: b[: len(b) // 2]), NAME, "zip"),
+        ("no zip", as_bytes(NAME, lambda _: b"solid" * 100), NAME, "zip"),
+        ("empty", as_bytes(NAME, lambda _: b""), NAME, "zip"),
         ("a bomb", members(bomb), NAME, "claim to unpack"),
-        ("a bomb that hides it", liar, NAME, "CRC"),
-        ("a member's own head broken", data(renamed), NAME, "zip"),
+        ("a bomb that hides it", LIAR, NAME, "CRC"),
+        ("a member's own head broken", as_bytes(NAME, renamed), NAME, "zip"),
         ("no model", members(lambda _: {"x": b"y"}), NAME, "broken 3MF"),
         ("text that ends early", members(lambda m: {**m, MODEL: m[MODEL][:-5000]}), NAME),
         ("a vertex that is no number", swapped('x="', 'x="nan'), NAME),

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
-from tests.verify.corpus.broken_records import MANIFEST, manifest
+from tests.verify.corpus.broken_records import MANIFEST
 from tests.verify.corpus.copies import put
-from tests.verify.corpus.mutation import Job, Mutation, failing, refusing
+from tests.verify.corpus.mutation import Job, Mutation, as_bytes, at, failing, refusing
 
 ROWS = 40_000_000  # facets: two gigabytes
 NEEDED = (
@@ -21,10 +22,6 @@ LONG = 84 + 50 * ROWS  # bytes
 
 def gone(name: str) -> Job:
     return lambda folder: (folder / name).unlink()
-
-
-def no_folder(folder: Path) -> None:
-    shutil.rmtree(folder)
 
 
 def instead(name: str, how: Callable[[Path], object]) -> Job:
@@ -64,16 +61,14 @@ def headed(more: int) -> bytes:
     return bytes(80) + (ROWS + more).to_bytes(4, "little")
 
 
-def heading(folder: Path) -> None:
-    data = (folder / "shell_a.stl").read_bytes()
-    put(folder, "shell_a.stl", b"UNITS=in".ljust(80, b"\0") + data[80:])
-
-
 def again(name: str) -> Job:
     """The same bytes in another file: who did that may have done more."""
-    return lambda folder: put(folder, name, (folder / name).read_bytes())
+    return as_bytes(name, bytes)
 
 
+HEADING = as_bytes("shell_a.stl", lambda data: b"UNITS=in".ljust(80, b"\0") + data[80:])
+listed = partial(at, file=MANIFEST)
+NOTHING = {"size": 1, "sha256": ""}
 CHANGED = "changed while it was read"
 WHILE_READ = {  # by the stage at whose beginning it happens
     "coverage": (
@@ -86,14 +81,14 @@ WHILE_READ = {  # by the stage at whose beginning it happens
 FILES: tuple[Mutation, ...] = (
     *refusing(
         "folder",
-        ("none", no_folder, "no such folder"),
+        ("none", shutil.rmtree, "no such folder"),
         *((f"no {name}", gone(name), f"{name}: missing") for name in NEEDED),
         ("an STL linked from outside", link_out("shell_a.stl"), "leads out"),
         ("a table linked from outside", link_out("mirrors.csv"), "leads out"),
         ("a pipe for an STL", instead("shell_a.stl", os.mkfifo), "shell_a.stl: not a regular file"),
     ),
     *refusing(
-        "heading", ("a unit in an STL's heading", heading, "shell_a.stl", "allowed are zeros")
+        "heading", ("a unit in an STL's heading", HEADING, "shell_a.stl", "allowed are zeros")
     ),
     # Refused before anybody reads so much, the hash included; so nobody needs to sign them.
     *refusing(
@@ -107,32 +102,16 @@ FILES: tuple[Mutation, ...] = (
     ),
     *failing(
         "manifest",
-        (
-            "a wrong hash",
-            manifest(lambda files: files["shell_a.step"].update(sha256="0" * 64)),
-            *("manifest", "shell_a.step"),
-        ),
-        (
-            "an entry missing",
-            manifest(lambda files: files.pop("shell_a.3mf")),
-            *("manifest", "shell_a.3mf"),
-        ),
-        (
-            "an entry for nothing",
-            manifest(lambda files: files.update(x={"size": 1, "sha256": ""})),
-            *("manifest", "x"),
-        ),
+        ("a wrong hash", listed("files/shell_a.step/sha256", "0" * 64), "manifest", "shell_a.step"),
+        ("an entry missing", listed("files/shell_a.3mf"), "manifest", "shell_a.3mf"),
+        ("an entry for nothing", listed("files/x", NOTHING), "manifest", "x"),
         signed=False,
     ),
     *refusing(
         "manifest",
-        (
-            "an entry outside",
-            manifest(lambda files: files.update({"../x": {"size": 0, "sha256": ""}})),
-            "not a plain file name",
-        ),
-        ("no entries", manifest(lambda files: files.clear()), "files is {}: "),
-        ("no hash", manifest(lambda files: files.update(x=1)), "files.x is 1: it should"),
+        ("an entry outside", listed("files", {"../x": NOTHING}), "not a plain file name"),
+        ("no entries", listed("files", {}), "files is {}: "),
+        ("no hash", listed("files/x", 1), "files.x is 1: it should"),
         signed=False,
     ),
     *(

@@ -17,9 +17,18 @@ from tbcad.core.optics.windows import seam_gaps
 from tbcad.core.spec.design import Spec
 from tbcad.output.build import write_export
 from tests.verify.corpus import part21
-from tests.verify.corpus.copies import change, load, load_mirrors, put, store, store_mirrors
+from tests.verify.corpus.copies import load, load_mirrors, put, store, store_mirrors
 from tests.verify.corpus.facets import balls, read, write
-from tests.verify.corpus.mutation import Job, Mutation, failing, refusing
+from tests.verify.corpus.mutation import (
+    Job,
+    Mutation,
+    as_bytes,
+    at,
+    failing,
+    plus,
+    refusing,
+    together,
+)
 
 Record = dict[str, Any]
 JSON, TABLE, MANIFEST = "design.json", "mirrors.csv", "manifest.json"
@@ -40,56 +49,6 @@ def mirrors(how: Callable[[list[Record], str], object], named: int = 0) -> Job:
 def mirror(how: Callable[[Record], object]) -> Job:
     """Change one row of mirrors.csv."""
     return mirrors(lambda rows, name: how(row_of(rows, name)), 1)
-
-
-def json_file(name: str, how: Callable[[Record], object]) -> Job:
-    def job(folder: Path) -> None:
-        value = load(folder, name)
-        how(value)
-        store(folder, name, value)
-
-    return job
-
-
-def design(how: Callable[[Record], object]) -> Job:
-    """Change design.json; no mirror is concerned."""
-    return json_file(JSON, how)
-
-
-def top(**keys: object) -> Job:
-    """Other keys of design.json."""
-    return design(lambda value: value.update(keys))
-
-
-def camera(**keys: object) -> Job:
-    """Other keys of the first camera."""
-    return design(lambda value: value["cameras"][0].update(keys))
-
-
-def part(**keys: object) -> Job:
-    """Other keys of the first part."""
-    return design(lambda value: value["parts"][0].update(keys))
-
-
-def spec(*path: str, **keys: object) -> Job:
-    """Other keys of a section of the spec."""
-
-    def how(value: Record) -> None:
-        section = value["spec"]
-        for name in path:
-            section = section[name]
-        section.update(keys)
-
-    return design(how)
-
-
-def manifest(how: Callable[[Record], object]) -> Job:
-    """Change the list of files in the manifest."""
-    return json_file(MANIFEST, lambda value: how(value["files"]))
-
-
-def as_text(name: str, how: Callable[[bytes], bytes]) -> Job:
-    return lambda folder: change(folder, name, how)
 
 
 def row_of(rows: list[Record], name: str) -> Record:
@@ -117,7 +76,7 @@ def word(new: bytes) -> Job:
         cells[5] = new
         return b"\n".join([*rows[:5], b",".join(cells), *rows[6:]])
 
-    return as_text(TABLE, how)
+    return as_bytes(TABLE, how)
 
 
 def radius(by: float) -> Job:
@@ -151,52 +110,30 @@ def second_column(data: bytes) -> bytes:
 
 def second_key(name: str, key: str, value: str) -> Job:
     """A key of a JSON object once more, before the others."""
-    return as_text(name, lambda data: data.replace(b"{", f'{{"{key}": {value},'.encode(), 1))
+    return as_bytes(name, lambda data: data.replace(b"{", f'{{"{key}": {value},'.encode(), 1))
 
 
 def leave_out(rows: list[Record], name: str) -> None:
     rows.remove(row_of(rows, name))
 
 
-def shift_camera(by: float, echo: bool) -> Job:
-    def how(value: Record) -> None:
-        for camera in value["cameras"]:
-            camera["pinhole_mm"][2] += by
-        if echo:
-            value["spec"]["optics"]["camera_mm"][2] += by
-
-    return design(how)
+def lower(*keys: str) -> Job:
+    """Cameras 0.1 mm lower, by these keys."""
+    return together(*(at(f"{key}/2", plus(-0.1)) for key in keys))
 
 
-def shift_one(value: Record) -> None:
-    value["cameras"][1]["pinhole_mm"][1] += 0.1
+def view(share: float, *keys: str) -> Job:
+    """Another view angle, by these keys."""
+    return together(*(at(f"{key}/hfov_deg", lambda value: value * share) for key in keys))
 
 
-def turn(value: Record) -> None:
+def turned(cameras: list[Record]) -> list[Record]:
     """Both cameras look elsewhere, by 30 degrees."""
     c, s = cos(radians(30)), sin(radians(30))
-    for camera in value["cameras"]:
+    for camera in cameras:
         forward, right = np.array(camera["forward"]), np.array(camera["right"])
         camera["forward"] = (c * forward + s * np.cross(forward, right)).tolist()
-
-
-def angle(share: float, echo: bool) -> Job:
-    def how(value: Record) -> None:
-        for owner in (*value["cameras"], *([value["spec"]["camera"]] if echo else [])):
-            owner["hfov_deg"] *= share
-
-    return design(how)
-
-
-def pixels(value: Record) -> None:
-    """A sensor so coarse that some mirrors have no pixel."""
-    for owner in (*value["cameras"], value["spec"]["camera"]):
-        owner["width_px"], owner["height_px"] = 16, 16
-
-
-def coat(value: Record) -> None:
-    value["coating_mm"] += 0.02
-    value["spec"]["mirrors"]["coating_um"] += 20
+    return cameras
 
 
 def above_the_worst(folder: Path) -> None:
@@ -205,19 +142,6 @@ def above_the_worst(folder: Path) -> None:
     value["target_mm"] = min(row["coverage_mm"] for row in load_mirrors(folder)) + 0.01
     value["spec"]["optics"]["capture_diameter_mm"] = value["target_mm"]
     store(folder, JSON, value)
-
-
-def foot(value: Record) -> None:
-    value["foot_z_mm"] += 0.01
-
-
-def subdivision(value: Record) -> None:
-    value["spec"]["optics"]["n"] += 1
-
-
-def without(kind: str) -> Job:
-    """The record names no file of a kind, so nobody reads it; the manifest still lists it."""
-    return design(lambda value: [part.pop(kind) for part in value["parts"]])
 
 
 def other_design(folder: Path) -> None:
@@ -241,7 +165,14 @@ def not_aimed(folder: Path) -> Sequence[str]:
     return [array.ids[int(gap.argmax())]]
 
 
-SEAM = ("shell", "seam_flange")
+SIDES = ("width", "height")
+CAMERAS = ("cameras/0", "cameras/1")
+PINHOLES = ("cameras/0/pinhole_mm", "cameras/1/pinhole_mm")
+PIXELS = together(  # so few that some mirrors have none
+    *(at(f"{key}/{side}_px", 16) for key in (*CAMERAS, "spec/camera") for side in SIDES)
+)
+FOOT = at("foot_z_mm", plus(0.01))
+COAT = together(at("coating_mm", plus(0.02)), at("spec/mirrors/coating_um", plus(20)))
 OPTICS = "spec.optics is missing"
 RECORDS: tuple[Mutation, ...] = (
     *failing(
@@ -260,33 +191,36 @@ RECORDS: tuple[Mutation, ...] = (
     ),
     *failing(
         JSON,
-        ("cameras 0.1 mm lower", shift_camera(-0.1, False), "requirements", "pinhole"),
-        ("cameras and spec 0.1 mm lower", shift_camera(-0.1, True), "poses"),
-        ("camera b 0.1 mm aside", design(shift_one), "requirements", "camera b pinhole 1"),
-        ("cameras turned by 30 degrees", design(turn), "frame margin"),
-        ("another view angle", angle(0.99, False), "requirements", "hfov"),
-        ("a view angle half as wide, spec too", angle(0.5, True), "frame margin"),
-        ("a sensor of 16 x 16 pixels, spec too", design(pixels), "pixels, minimum"),
-        ("a coat that is not there, by STEP", design(coat), "step surfaces", "0.02 mm"),
+        ("cameras 0.1 mm lower", lower(*PINHOLES), "requirements", "pinhole"),
+        ("cameras and spec 0.1 mm lower", lower(*PINHOLES, "spec/optics/camera_mm"), "poses"),
+        ("camera b 0.1 mm aside", at(f"{PINHOLES[1]}/1", plus(0.1)), "requirements", "b pinhole 1"),
+        ("cameras turned by 30 degrees", at("cameras", turned), "frame margin"),
+        ("another view angle", view(0.99, *CAMERAS), "requirements", "hfov"),
+        ("a view angle half as wide, spec too", view(0.5, *CAMERAS, "spec/camera"), "frame margin"),
+        ("a sensor of 16 x 16 pixels, spec too", PIXELS, "pixels, minimum"),
+        ("a coat that is not there, by STEP", COAT, "step surfaces", "0.02 mm"),
         ("a target not met", above_the_worst, "coverage, spheres"),
-        ("a lower target than the spec's", top(target_mm=30.0), "requirements", "target_mm"),
-        ("the foot 10 um higher", design(foot), "step cells"),
-        ("another n in the spec", design(subdivision), "directions", "without a mirror"),
-        ("the foot 10 um higher, by mesh", design(foot), "mesh seam and foot", "beyond the foot"),
+        ("a lower target than the spec's", at("target_mm", 30.0), "requirements", "target_mm"),
+        ("the foot 10 um higher", FOOT, "step cells"),
+        ("another n in the spec", at("spec/optics/n", plus(1)), "directions", "without a mirror"),
+        ("the foot 10 um higher, by mesh", FOOT, "mesh seam and foot", "beyond the foot"),
         *(
-            (f"a wall of 2.9 mm, by {file}", spec("shell", wall_mm=2.9), f"{file} wall", "3.000 mm")
+            (f"{name}, by {file}", at(f"spec/shell/{key}", value), f"{file} {check}", told)
             for file in ("step", "mesh")
+            for name, key, value, check, told in (
+                ("a wall of 2.9 mm", "wall_mm", 2.9, "wall", "3.000 mm"),
+                ("20 bolts", "seam_flange/bolts", 20, "holes", "not 20"),
+            )
         ),
+        ("another radius rule", at("spec/mirrors/radius_rule", "paper"), "radius rule", "by rule"),
+        ("a mesh error", at("spec/mesh/structure_error_mm", 5.0), "requirements", "mesh error"),
+        ("a part forgotten", at("parts/-1"), "mirrors found", "b0001"),
         *(
-            (f"20 bolts, by {file}", spec(*SEAM, bolts=20), f"{file} holes", "not 20")
-            for file in ("step", "mesh")
+            # so nobody reads it; the manifest still lists it
+            (f"no {kind}", together(*(at(f"parts/{k}/{kind}") for k in (0, 1))), "part files", told)
+            for kind, told in (("step", "shell_a has none"), ("3mf", "shell_a has none"))
         ),
-        ("another radius rule", spec("mirrors", radius_rule="paper"), "radius rule", "by rule"),
-        ("a mesh error", spec("mesh", structure_error_mm=5.0), "requirements", "mesh error"),
-        ("a part forgotten", design(lambda one: one["parts"].pop()), "mirrors found", "b0001"),
-        ("no STEP", without("step"), "part files", "shell_a has none"),
-        ("no 3MF", without("3mf"), "part files", "shell_a has none"),
-        ("a part for the other camera", part(camera="b"), "mirrors found", "missing"),
+        ("a part for the other camera", at("parts/0/camera", "b"), "mirrors found", "missing"),
     ),
     *failing(
         "all",
@@ -297,32 +231,32 @@ RECORDS: tuple[Mutation, ...] = (
     ),
     *refusing(
         TABLE,
-        ("a second column", as_text(TABLE, second_column), "column radius_mm is there twice"),
+        ("a second column", as_bytes(TABLE, second_column), "column radius_mm is there twice"),
         ("NaN", word(b"nan"), TABLE, "line 6: px is nan: it should"),
         ("a field empty", word(b""), TABLE, "line 6: px is ''"),
         ("a field too many", word(b"1.0,2.0"), TABLE, "line 6 has"),
-        ("cut in a line", as_text(TABLE, lambda b: b[:-30]), TABLE, "truncated"),
-        ("no heading", as_text(TABLE, lambda b: b.partition(b"\n")[2]), TABLE, "first line"),
+        ("cut in a line", as_bytes(TABLE, lambda b: b[:-30]), TABLE, "truncated"),
+        ("no heading", as_bytes(TABLE, lambda b: b.partition(b"\n")[2]), TABLE, "first line"),
     ),
     *refusing(
         JSON,
-        ("a spec that asks nothing", design(lambda value: value["spec"].pop("optics")), OPTICS),
+        ("a spec that asks nothing", at("spec/optics"), OPTICS),
         ("a second target", second_key(JSON, "target_mm", "1.0"), "key target_mm is"),
-        ("cut short", as_text(JSON, lambda b: b[: len(b) // 2]), JSON, "broken JSON"),
-        ("not UTF-8", as_text(JSON, lambda b: b"\xff" + b), JSON, "UTF-8"),
-        ("the version before", top(schema="tbcad-design/1"), "verifies tbcad-design/2"),
-        ("a table outside", top(mirrors="../m.csv"), "../m.csv"),
-        ("axes that are no axes", camera(forward=[0.0, 0.1, 1.0]), JSON, "forward and right"),
-        ("a sensor without columns", camera(width_px=0), "width_px"),
-        ("a target in words", top(target_mm="60"), "target_mm"),
-        ("no parts", top(parts=[]), "parts"),
-        ("a part outside", part(stl="../shell_a.stl"), "stl is ../shell_a.stl"),
-        ("a part that is not there", part(**{"3mf": "x.3mf"}), "x.3mf", "missing"),
+        ("cut short", as_bytes(JSON, lambda b: b[: len(b) // 2]), JSON, "broken JSON"),
+        ("not UTF-8", as_bytes(JSON, lambda b: b"\xff" + b), JSON, "UTF-8"),
+        ("the version before", at("schema", "tbcad-design/1"), "verifies tbcad-design/2"),
+        ("a table outside", at("mirrors", "../m.csv"), "../m.csv"),
+        ("axes that are no axes", at("cameras/0/forward", [0.0, 0.1, 1.0]), "forward and right"),
+        ("a sensor without columns", at("cameras/0/width_px", 0), "width_px"),
+        ("a target in words", at("target_mm", "60"), "target_mm"),
+        ("no parts", at("parts", []), "parts"),
+        ("a part outside", at("parts/0/stl", "../shell_a.stl"), "stl is ../shell_a.stl"),
+        ("a part that is not there", at("parts/0/3mf", "x.3mf"), "x.3mf", "missing"),
     ),
     *refusing(
         MANIFEST,
         ("a second list", second_key(MANIFEST, "files", "{}"), "key files is there twice"),
-        ("that of a capture", json_file(MANIFEST, lambda v: v.update(kind="capture")), "kind"),
+        ("that of a capture", at("kind", "capture", MANIFEST), "kind"),
         signed=False,
     ),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,11 +13,12 @@ from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Check
 from tbcad_verify.run.verify import VerifyOptions, verify
 
-from tests.verify.corpus.copies import copy, sign
+from tests.verify.corpus.copies import change, copy, load, sign, store
 
 # Breaks a copy of a good export in place, and may return what the message must name.
 Job = Callable[[Path], Sequence[str] | None]
 HERE = VerifyOptions(write=False, apart=False)
+DROP = object()
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,54 @@ def failing(kind: str, *rows: tuple[Any, ...], **more: Any) -> tuple[Mutation, .
 def refusing(kind: str, *rows: tuple[Any, ...], **more: Any) -> tuple[Mutation, ...]:
     """A table of mutations that are refused: name, job, words to be said."""
     return tuple(replace(refused(name, kind, *rest), **more) for name, *rest in rows)
+
+
+def at(path: str, to: object = DROP, file: str = "design.json") -> Job:
+    """Another value at a path of keys of a JSON file, or what a function makes of it; or none.
+
+    Items of a list are named by number, or by what the first one's name or part begins with.
+    """
+
+    def job(folder: Path) -> None:
+        value = inside = load(folder, file)
+        *keys, last = path.split("/")
+        for key in keys:
+            inside = inside[_place(inside, key)]
+        place = _place(inside, last)
+        if to is DROP:
+            del inside[place]
+        else:
+            inside[place] = to(inside[place]) if callable(to) else to
+        store(folder, file, value)
+
+    return job
+
+
+def _place(value: Any, key: str) -> str | int:
+    if isinstance(value, dict):
+        return key
+    if re.fullmatch(r"-?\d+", key):
+        return int(key)
+    names = [(one.get("name", ""), one.get("part", "")) for one in value]
+    return next(k for k, some in enumerate(names) if any(name.startswith(key) for name in some))
+
+
+def plus(by: float) -> Callable[[float], float]:
+    return lambda value: value + by
+
+
+def together(*jobs: Job) -> Job:
+    """Several changes, in order."""
+    return lambda folder: [word for job in jobs for word in job(folder) or ()]
+
+
+def as_bytes(name: str, how: Callable[[bytes], bytes]) -> Job:
+    """Change the bytes of a file."""
+
+    def job(folder: Path) -> None:
+        change(folder, name, how)
+
+    return job
 
 
 def attempt(mutation: Mutation, export: Path, room: Path) -> str:

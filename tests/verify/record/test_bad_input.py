@@ -15,19 +15,11 @@ from tbcad_verify.record import files
 
 from tests.verify.corpus.broken_files import FILES
 from tests.verify.corpus.broken_meshes import MESHES
-from tests.verify.corpus.broken_records import (
-    JSON,
-    RECORDS,
-    TABLE,
-    as_text,
-    camera,
-    design,
-    manifest,
-    top,
-)
-from tests.verify.corpus.mutation import Mutation, refusing
+from tests.verify.corpus.broken_records import JSON, MANIFEST, RECORDS, TABLE
+from tests.verify.corpus.mutation import Mutation, as_bytes, at, refusing
 from tests.verify.optical_setups import IN_PROCESS
 
+BIG = {"width_px": 65536, "height_px": 65536}
 LONG_NUMBER = b'"target_mm": ' + b"9" * 5000
 
 
@@ -41,37 +33,37 @@ BROKEN = (
     ),
     *refusing(
         JSON,
-        ("schema a list", top(schema=[1]), "schema is [1], this"),
-        ("no spec", design(lambda d: d.pop("spec")), "spec is missing"),
-        ("no object", as_text(JSON, lambda _: b"[]"), "JSON object"),
-        ("deep", as_text(JSON, lambda _: b"[" * 100_000), "broken JSON"),
-        ("NaN", top(target_mm=math.nan), "NaN"),
-        ("true", top(target_mm=True), "target_mm is True: it should"),
+        ("schema a list", at("schema", [1]), "schema is [1], this"),
+        ("no spec", at("spec"), "spec is missing"),
+        ("no object", as_bytes(JSON, lambda _: b"[]"), "JSON object"),
+        ("deep", as_bytes(JSON, lambda _: b"[" * 100_000), "broken JSON"),
+        ("NaN", at("target_mm", math.nan), "NaN"),
+        ("true", at("target_mm", True), "target_mm is True: it should"),
         (
             "a target of thousands of digits",
-            as_text(JSON, lambda data: re.sub(rb'"target_mm": [\d.]+', LONG_NUMBER, data)),
+            as_bytes(JSON, lambda data: re.sub(rb'"target_mm": [\d.]+', LONG_NUMBER, data)),
             "broken JSON",
         ),
-        ("short vector", camera(forward=[0, 1]), "cameras[0].forward is [0, 1]"),
-        ("absurd sensor", camera(width_px=10**9), "width_px is 1000000000"),
-        ("big sensor", camera(width_px=65536, height_px=65536), "at most"),
-        ("half a pixel", camera(width_px=260.5), "it should be a valid integer"),
-        ("absurdly many cameras", top(cameras=[1] * 10**6), "cameras is [1, 1, 1, 1,"),
-        ("cameras alike", design(lambda d: d["cameras"].append(d["cameras"][0])), "differ"),
+        ("short vector", at("cameras/0/forward", [0, 1]), "cameras[0].forward is [0, 1]"),
+        ("absurd sensor", at("cameras/0/width_px", 10**9), "width_px is 1000000000"),
+        ("big sensor", at("cameras/0", lambda one: one | BIG), "at most"),
+        ("half a pixel", at("cameras/0/width_px", 260.5), "it should be a valid integer"),
+        ("absurdly many cameras", at("cameras", [1] * 10**6), "cameras is [1, 1, 1, 1,"),
+        ("cameras alike", at("cameras", lambda some: [*some, some[0]]), "differ"),
     ),
     *refusing(
         "manifest.json",
         (
             "absurdly many files",
-            manifest(lambda files: files.update(dict.fromkeys(map(str, range(10**6)), 1))),
+            at("files", lambda some: some | dict.fromkeys(map(str, range(10**6)), 1), MANIFEST),
             "files lists 1000005; at most 10000 are read",
         ),
     ),
     *refusing(
         TABLE,
-        ("no rows", as_text(TABLE, lambda b: b.split(b"\n")[0] + b"\n"), "0 rows"),
-        ("foreign", as_text(TABLE, lambda _: b"a,b\n1,2\n"), "first line"),
-        ("a quote", as_text(TABLE, lambda b: b + b'"a'), "broken CSV"),
+        ("no rows", as_bytes(TABLE, lambda b: b.split(b"\n")[0] + b"\n"), "0 rows"),
+        ("foreign", as_bytes(TABLE, lambda _: b"a,b\n1,2\n"), "first line"),
+        ("a quote", as_bytes(TABLE, lambda b: b + b'"a'), "broken CSV"),
     ),
 )
 
@@ -113,7 +105,7 @@ def test_what_is_no_file_in_a_manifest_is_refused_as_such(
     path = export_folder / name
     path.unlink(missing_ok=True)
     path.mkdir() if kind == "folder" else os.mkfifo(path)
-    manifest(lambda files: files.update({name: {"sha256": "0" * 64, "size": 0}}))(export_folder)
+    at(f"files/{name}", {"sha256": "0" * 64, "size": 0}, MANIFEST)(export_folder)
     with pytest.raises(
         BadExport, match=f"^{name}: not a regular file but {told}, yet in the manifest"
     ):

@@ -13,8 +13,8 @@ from pydantic import BaseModel
 from tbcad_verify.record.spec import Spec
 
 from tbcad.core.spec.design import Spec as DesignSpec
-from tests.verify.corpus.broken_records import JSON, design
-from tests.verify.corpus.mutation import refused
+from tests.verify.corpus.broken_records import JSON
+from tests.verify.corpus.mutation import at, refused
 
 LIMITS = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum", "minItems", "maxItems")
 # Chosen by a build, so that an export has numbers; checked in words instead of ranges by tbcad.
@@ -83,7 +83,7 @@ def test_a_value_outside_its_range_is_refused(
 ) -> None:
     from tests.verify.record.test_bad_input import test_broken_export_is_refused
 
-    change = design(lambda found: found["spec"][section].update({key: value}))
+    change = at(f"spec/{section}/{key}", value)
     mutation = refused(key, JSON, change, f"spec.{section}.{key} is {value}: ")
     test_broken_export_is_refused(export_folder, mutation)
 
