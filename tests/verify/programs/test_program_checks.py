@@ -42,11 +42,6 @@ def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return install(tmp_path / "bin")
 
 
-@pytest.fixture
-def without_gmsh(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "gmsh", None)
-
-
 def ask(export: Path, part: ExpectedPart = PART, seconds: float = 20) -> list[Check]:
     return check_with_programs(export, [part], seconds)
 
@@ -57,11 +52,6 @@ def failed(checks: Sequence[Check]) -> list[str]:
 
 def figure(checks: Sequence[Check], name: str) -> float | None:
     return next(check.measured for check in checks if check.name == name)
-
-
-@pytest.mark.usefixtures("without_gmsh")
-def test_absent_programs_are_skipped(export: Path) -> None:
-    assert all(map(is_skipped, ask(export)))
 
 
 def test_good_programs_pass(export: Path, programs: Path) -> None:
@@ -122,13 +112,6 @@ def test_freecad(export: Path, programs: Path, changes: dict[str, float], wrong:
     assert failed(checks) == [f"freecad {name}" for name in wrong]
     flaws = sum(changes.values()) if wrong == ["valid"] else int("valid" in wrong)
     assert figure(checks, "freecad valid") == flaws
-
-
-def test_gmsh_counts_solids(export: Path, programs: Path) -> None:
-    install(programs, gmsh=GOOD["gmsh"].replace("[(3, 0)]", "[(3, 0), (3, 1)]"))
-    checks = ask(export)
-    assert failed(checks) == ["gmsh solids", "gmsh volume"]
-    assert (figure(checks, "gmsh solids"), figure(checks, "gmsh spheres")) == (2, 7)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import signal
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Check
@@ -76,18 +75,6 @@ def test_no_worker_outlives_an_interrupt() -> None:
         watch(STAGES, results, 30, stages, "hangs")
     assert started
     assert not Path(f"/proc/{started[0]}").exists()
-
-
-def test_results_add_up() -> None:
-    titles: list[str] = []
-    results = CollectedResults(progress=titles.append)
-    column = np.array([1.0, np.nan, 0.1 + 0.2])
-    results.add(Results(stages=["s"], checks=[CHECK]))
-    results.add(Results(mirrors={"pixels": column}, printing=[{"part": "x"}], checks=[CHECK]))
-    assert titles == results.stages == ["s"]
-    assert results.checks == [CHECK, CHECK]
-    assert results.printing == [{"part": "x"}]
-    np.testing.assert_array_equal(results.mirrors["pixels"], column)
 
 
 def test_the_result_is_the_same_in_a_process_of_its_own(sample_folder: Path) -> None:
