@@ -6,7 +6,7 @@ import io
 import json
 import re
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +49,9 @@ def asked(key: str, to: object) -> Job:
 def table(name: str, how: Callable[[Rows], object]) -> Job:
     """Change the rows of a table."""
 
-    def job(folder: Path) -> Sequence[str]:
+    def job(folder: Path) -> None:
         put(folder, name, (folder / name).read_bytes())  # a file of its own
         edit_csv(folder / name, how)
-        return ()
 
     return job
 
@@ -65,30 +64,28 @@ def row(name: str, number: int, **cells: object) -> Job:
 def redrawn(name: str, how: Callable[[Any], object]) -> Job:
     """Change the entities of a DXF."""
 
-    def job(folder: Path) -> Sequence[str]:
+    def job(folder: Path) -> None:
         document = ezdxf.filemanagement.readfile(folder / name)
         how(document.modelspace())
         text = io.StringIO()
         document.write(text)
         put(folder, name, text.getvalue().encode())
-        return ()
 
     return job
 
 
-def circles(space: Any) -> list[Any]:
-    """Circles to be cut, the smallest first."""
+def smallest_circle(space: Any) -> Any:
+    """Of those to be cut."""
     found = [one for one in space.query("CIRCLE") if one.dxf.layer == "cut"]
-    return sorted(found, key=lambda one: one.dxf.radius)
+    return min(found, key=lambda one: one.dxf.radius)
 
 
 def shifted_circle(space: Any) -> None:
-    x, y, _ = circles(space)[0].dxf.center
-    circles(space)[0].dxf.center = (x + 0.01, y)
+    smallest_circle(space).dxf.center += (0.01, 0)
 
 
 def fewer_circles(space: Any) -> None:
-    space.delete_entity(circles(space)[0])
+    space.delete_entity(smallest_circle(space))
 
 
 def longer_outline(space: Any) -> None:
@@ -125,7 +122,7 @@ def undrawn(name: str) -> Job:
 def glb(how: Callable[[Any, bytearray], object]) -> Job:
     """Change the JSON or the numbers of the GLB."""
 
-    def job(folder: Path) -> Sequence[str]:
+    def job(folder: Path) -> None:
         data = (folder / GLB).read_bytes()
         (length,) = struct.unpack_from("<I", data, 12)
         document, binary = json.loads(data[20 : 20 + length]), bytearray(data[28 + length :])
@@ -135,7 +132,6 @@ def glb(how: Callable[[Any, bytearray], object]) -> Job:
         chunks = struct.pack("<I4s", len(text), b"JSON") + text
         chunks += struct.pack("<I4s", len(binary), b"BIN\0") + binary
         put(folder, GLB, struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
-        return ()
 
     return job
 
@@ -143,17 +139,14 @@ def glb(how: Callable[[Any, bytearray], object]) -> Job:
 def mounted_in(body: str, key: str) -> Job:
     """The first fastener that presses on a body is mounted in another step."""
 
-    def job(folder: Path) -> Sequence[str]:
-        value = load(folder, RECORD)
+    def how(value: Any) -> Any:
         name = next(one["name"] for one in value["fasteners"] if one["through"][0] == body)
         for step in value["assembly_steps"]:
-            step["mounts"] = [one for one in step["mounts"] if one != name]
-            if step["key"] == key:
-                step["mounts"].append(name)
-        store(folder, RECORD, value)
-        return ()
+            others = [one for one in step["mounts"] if one != name]
+            step["mounts"] = [*others, *[name] * (step["key"] == key)]
+        return value
 
-    return job
+    return lambda folder: store(folder, RECORD, how(load(folder, RECORD)))
 
 
 def spigot(cap: str, by: float) -> Job:
@@ -172,12 +165,12 @@ def spigot(cap: str, by: float) -> Job:
 def renamed(old: str, new: str) -> Job:
     """A file of the carrier under another name, which the record tells."""
 
-    def job(folder: Path) -> Sequence[str]:
+    def job(folder: Path) -> None:
         (folder / old).rename(folder / new)
         manifest = load(folder, "manifest.json")
         manifest["files"][new] = manifest["files"].pop(old)
         store(folder, "manifest.json", manifest)
-        return record("parts/carrier/step", new)(folder) or ()
+        record("parts/carrier/step", new)(folder)
 
     return job
 
@@ -234,12 +227,8 @@ def moved_part(text: str) -> str:
     return text.replace(old, f"#{point[1]} = CARTESIAN_POINT('',(5.,0.,0.))")
 
 
-def shifted(key: str, by: float) -> Callable[[Rows], None]:
-    def how(rows: Rows) -> None:
-        for one in rows:
-            one[key] = repr(float(one[key]) + by)
-
-    return how
+def moved_hole(rows: Rows) -> None:
+    rows[0]["y_mm"] = repr(float(rows[0]["y_mm"]) + 0.01)
 
 
 ENTITY_END = r"(ENDSEC;\s+END)"
@@ -316,8 +305,8 @@ FAILING: Broken = {
         "the motor drawn aside": (drawn_away("motor", 0.1), "motor"),
     },
     ("plate holes", HOLES): {
-        "a hole less": (table(HOLES, lambda rows: rows.pop()), "the plate has 16"),
-        "a hole 10 um aside": (table(HOLES, lambda r: shifted("y_mm", 0.01)(r[:1])), "hole 1"),
+        "a hole less": (table(HOLES, list.pop), "the plate has 16"),
+        "a hole 10 um aside": (table(HOLES, moved_hole), "hole 1"),
     },
     ("drawings", "DXF"): {
         f"drawing: {name} of {file}": (redrawn(file, how), words)
@@ -438,7 +427,7 @@ FAILING: Broken = {
         ),
     },
     ("dark background", RECORD): {
-        "a carrier that is not black": (record("parts/carrier/finish", None), "end on carrier"),
+        "a carrier not black": (record("parts/carrier/finish", None), "end on carrier"),
         "card that is white": (record("shroud/finish", "white"), "shroud_lid"),
     },
     ("shroud", PATTERN): {
@@ -530,7 +519,7 @@ PROTOTYPES: tuple[Mutation, ...] = (
         for (check, kind), some in UNSURE.items()
         for name, (job, words) in some.items()
     ),
-    refused("a plate of no holes", HOLES, table(HOLES, lambda rows: rows.clear()), HOLES, "0 rows"),
+    refused("a plate of no holes", HOLES, table(HOLES, list.clear), HOLES, "0 rows"),
     refused("no home", RECORD, record("home"), RECORD, "home is missing"),
     refused(
         "three marks", RECORD, record("camera_place/marks_mm/0/-1"), RECORD, "a near and a far"

@@ -195,10 +195,14 @@ def _same_places(
     for title in solids.keys() & drawn.keys():
         distance = np.asarray(cKDTree(drawn[title][0]).query(solids[title].corners)[0])
         errors[title] = max(errors.get(title, 0.0), float(distance.max(initial=0)))
-    for title, centre, radius in _balls(context):
+    balls = context.prototype.balls
+    for k in np.flatnonzero(~balls.cap).tolist():
+        title, centre = f"ball_{k + 1}", balls.columns("bx", 3)[:, k]
         faces = solids[title].faces if title in solids else ()
         off = [
-            float(max(np.abs(face.point - centre).max(), abs(face.radius - radius)))
+            float(
+                max(np.abs(face.point - centre).max(), abs(face.radius - balls.body_radius_mm[k]))
+            )
             for face in faces
             if face.kind == "sphere"
         ]
@@ -206,13 +210,6 @@ def _same_places(
     wrong = sorted(title for title, error in errors.items() if not error <= SINGLE_MM)
     worst = max(errors.values(), default=np.inf)
     return at_most(name, worst, SINGLE_MM, f"elsewhere, or of another shape: {short_list(wrong)}")
-
-
-def _balls(context: PrototypeContext) -> Iterator[tuple[str, Floats, float]]:
-    """Name, centre and radius of the balls that are no caps."""
-    balls = context.prototype.balls
-    for k in np.flatnonzero(~balls.cap).tolist():
-        yield f"ball_{k + 1}", balls.columns("bx", 3)[:, k], float(balls.body_radius_mm[k])
 
 
 def all_solids(parts: list[MeasuredPart], drawn: Mapping[str, Shape]) -> dict[str, Any]:

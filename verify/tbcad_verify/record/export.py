@@ -206,24 +206,23 @@ def listed_names(folder: Path) -> frozenset[str]:
 
     BadExport: the folder is no export, which is told at once however much is in it.
     """
-    root = open_folder(folder)
-    _refuse_other_folders(root)
+    root = _open_build(folder)
     text = read(root, MANIFEST, MAX_TEXT_BYTES)
     manifest = validated(MANIFEST, Manifest, parse_json(text, MANIFEST_SCHEMA))
     return frozenset({*manifest.files, *TEXTS})
 
 
-def _refuse_other_folders(root: Path) -> None:
-    """Refuse what is no build by the first files that there would be.
+def _open_build(folder: Path) -> Path:
+    """The folder, resolved; what is no build is known by the first files that there would be.
 
-    BadExport: it is something else that tbcad wrote, or nothing of tbcad.
+    BadExport: it is missing, something else that tbcad wrote, or nothing of tbcad.
     """
+    root = open_folder(folder)
     there = {name for name in (DESIGN, MANIFEST, *OTHER_RECORDS) if os.path.lexists(root / name)}
-    if {DESIGN, MANIFEST} <= there:
-        return
     others = [words for name, words in OTHER_RECORDS.items() if name in there]
-    if not others and there:
-        return  # a build without one of its files, which its reader names
+    # Without one of its files it is a build too, which its reader names.
+    if {DESIGN, MANIFEST} <= there or (there and not others):
+        return root
     told = others[0] if others else "a folder without design.json and manifest.json"
     if not others and not any(root.iterdir()):
         told = "an empty folder"
@@ -235,8 +234,7 @@ def read_export(folder: Path) -> Export:
 
     BadExport: anything missing, foreign, malformed, not finite or absurd.
     """
-    root = open_folder(folder)
-    _refuse_other_folders(root)
+    root = _open_build(folder)
     texts = {name: read(root, name, MAX_TEXT_BYTES) for name in TEXTS}
     design = validated(DESIGN, Design, parse_json(texts[DESIGN], SCHEMA))
     manifest = validated(MANIFEST, Manifest, parse_json(texts[MANIFEST], MANIFEST_SCHEMA))

@@ -151,13 +151,10 @@ def _requested_printers(report: Report) -> list[KeyFigure]:
 
 def _margin(check: Check) -> tuple[bool, bool, float]:
     """The least for a failure, then for what is unknown, then for the smallest share left."""
+    from tbcad_verify.report.checks import AT_LEAST  # the names above are wanted without numpy
+
     share = 0.0
     if check.measured is not None and check.limit:
         share = check.measured / check.limit
-    return check.passed is not False, check.passed is True, share * _sign(check)
-
-
-def _sign(check: Check) -> int:
-    from tbcad_verify.report.checks import AT_LEAST  # the names above are wanted without numpy
-
-    return 1 if check.bound == AT_LEAST else -1
+    sign = 1 if check.bound == AT_LEAST else -1
+    return check.passed is not False, check.passed is True, share * sign

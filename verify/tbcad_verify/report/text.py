@@ -16,7 +16,7 @@ from rich.text import Text
 from tbcad_verify.programs import is_skipped
 from tbcad_verify.report.as_made import as_made_lines
 from tbcad_verify.report.checks import AT_LEAST, AT_MOST, EXACTLY, Check, at_most
-from tbcad_verify.report.methods import KEY_FIGURES, KeyFigure, checks_named, key_figures, remedy
+from tbcad_verify.report.methods import KEY_FIGURES, checks_named, key_figures, remedy
 
 if TYPE_CHECKING:
     from tbcad_verify.report.report import Report
@@ -197,17 +197,15 @@ def summary(report: Report) -> list[Text]:
     failed = _failure_lines(report)
     as_made = as_made_lines(report.as_made, report.valleys)[: AS_MADE_LINES if failed else None]
     note = textwrap.wrap(report.note, WIDTH, max_lines=NOTE_LINES, placeholder=MORE)
-    end = [*_skipped_line(report), *note, _end_line(report)]
+    asked = sum(map(is_skipped, report.programs))
+    skipped = [f"{asked} questions to other programs skipped: see --full"] if asked else []
+    end = [*skipped, *note, _end_line(report)]
     changed = changed_lines(report.checks)
     room = MAX_LINES - 1 - sum(map(len, (changed, failed, as_made, end)))
     figures = _figure_lines(report, room)
-    return [_coloured(report), *map(Text, (*changed, *failed, *figures, *as_made, *end))]
-
-
-def _coloured(report: Report) -> Text:
-    line = Text(report.verdict)
-    line.stylize("bold green" if report.passed else "bold red", 0, len("PASS"))
-    return line
+    verdict = Text(report.verdict)
+    verdict.stylize("bold green" if report.passed else "bold red", 0, len("PASS"))
+    return [verdict, *map(Text, (*changed, *failed, *figures, *as_made, *end))]
 
 
 def _failure_lines(report: Report) -> list[str]:
@@ -260,9 +258,10 @@ def _rest_line(names: Sequence[str]) -> Iterator[str]:
 def _figure_lines(report: Report, room: int) -> list[str]:
     """Key figures with their limits in two columns; what failed is named elsewhere."""
     rows = [
-        (one.label, _short_figure(check.measured), limit_text(check, _unit(one, check)))
+        (one.label, _short_figure(check.measured), limit_text(check, unit))
         for one, check in key_figures(report)
         if check.passed
+        for unit in [check.unit if one.unit is None else one.unit]
     ]
     both = _in_columns(rows[: 2 * room])
     return both if max(map(len, both), default=0) <= WIDTH else _in_columns(rows[:room], 1)
@@ -279,20 +278,11 @@ def _short_figure(value: float | None) -> str:
     return figure(value, DIGITS - (value is not None and abs(value) < 1))
 
 
-def _unit(one: KeyFigure, check: Check) -> str:
-    return check.unit if one.unit is None else one.unit
-
-
 def _aligned(rows: Sequence[FigureRow]) -> list[str]:
     if not rows:
         return []
     label, measured, limit = (max(map(len, column)) for column in zip(*rows, strict=True))
     return [f"{a:<{label}} {b:>{measured}} {c:<{limit}}" for a, b, c in rows]
-
-
-def _skipped_line(report: Report) -> list[str]:
-    count = sum(map(is_skipped, report.programs))
-    return [f"{count} questions to other programs skipped: see --full"] if count else []
 
 
 def _end_line(report: Report) -> str:
