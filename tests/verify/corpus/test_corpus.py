@@ -1,26 +1,34 @@
-"""Broken meshes and records of a real export must be caught; what is as good must not be."""
+"""Broken files and records of a real export must be caught; what is as good must not be."""
 
 from __future__ import annotations
 
 import json
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from tbcad_verify import main, verify
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from tbcad_verify import BadExport, main, verify
 
+from tests.helpers import read_3mf
 from tests.verify.corpus import part21
-from tests.verify.corpus.broken_files import gone
+from tests.verify.corpus.broken_3mfs import THREEMFS
+from tests.verify.corpus.broken_files import FILES, gone
 from tests.verify.corpus.broken_meshes import MESHES, dented, mesh
 from tests.verify.corpus.broken_records import RECORDS, mirrors
+from tests.verify.corpus.broken_steps import STEPS
 from tests.verify.corpus.copies import change, copy, load, put, sign
 from tests.verify.corpus.facets import HALVES, read, write, write_stl
 from tests.verify.corpus.mutation import HERE, Mutation, at, attempt, fails, refused
+from tests.verify.synthetic_export import facets_of
 
 pytestmark = pytest.mark.corpus
 
 
-@pytest.mark.parametrize("mutation", [*MESHES, *RECORDS], ids=str)
+@pytest.mark.parametrize("mutation", [*MESHES, *RECORDS, *STEPS, *THREEMFS, *FILES], ids=str)
 def test_caught(mutation: Mutation, good: Path, tmp_path: Path) -> None:
     assert attempt(mutation, good, tmp_path) == ""
 
@@ -101,3 +109,44 @@ def test_exit_statuses(good: Path, tmp_path: Path, capsys: pytest.CaptureFixture
     out = capsys.readouterr()
     assert out.out == ""
     assert "shell_b.step: missing" in out.err
+
+
+READERS = {"shell_a.stl": lambda path: [facets_of(path)], "shell_a.3mf": read_3mf}
+NAMES = ("design.json", "mirrors.csv", "manifest.json", "shell_a.step", *READERS)
+
+
+@given(
+    name=st.sampled_from(NAMES),
+    place=st.floats(0, 1, exclude_max=True),
+    bit=st.none() | st.integers(0, 7),
+    piece=st.binary(max_size=20),
+    length=st.none() | st.integers(0, 200),
+)
+@example(name="shell_a.step", place=0.5, bit=None, piece=b"", length=None)
+@settings(max_examples=30)
+def test_noise_is_told_in_one_line_and_moves_no_facet_unseen(
+    good: Path, name: str, place: float, bit: int | None, piece: bytes, length: int | None
+) -> None:
+    """A bit turned, a piece replaced, or (no length) the file cut short."""
+
+    def spoilt(data: bytes) -> bytes:
+        at = int(place * len(data))
+        if bit is not None:
+            return data[:at] + bytes([data[at] ^ (1 << bit)]) + data[at + 1 :]
+        return data[:at] + piece + (b"" if length is None else data[at + length :])
+
+    with tempfile.TemporaryDirectory() as room:
+        folder = copy(good, Path(room) / "export")
+        change(folder, name, spoilt)
+        if name != "manifest.json":
+            sign(folder)
+        try:
+            report = verify(folder, options=HERE)
+        except BadExport as error:
+            said, passed = str(error), False
+        else:
+            said, passed = report.verdict, report.passed
+        assert "\n" not in said
+        if passed and name in READERS:
+            both = (READERS[name](path / name) for path in (good, folder))
+            assert all(np.array_equal(*pair) for pair in zip(*both, strict=True))

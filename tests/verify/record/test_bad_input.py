@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from tbcad_verify import BadExport, main, verify
 from tbcad_verify.record import files
+from tbcad_verify.record.export import OTHER_RECORDS, read_export
 
 from tests.verify.corpus.broken_files import FILES
 from tests.verify.corpus.broken_meshes import MESHES
@@ -47,6 +48,8 @@ BROKEN = (
         ("short vector", at("cameras/0/forward", [0, 1]), "cameras[0].forward is [0, 1]"),
         ("absurd sensor", at("cameras/0/width_px", 10**9), "width_px is 1000000000"),
         ("big sensor", at("cameras/0", lambda one: one | BIG), "at most"),
+        ("a view that fits", at("spec/camera/hfov_deg", "fit"), "spec.camera.hfov_deg is fit: "),
+        ("too fine a polyhedron", at("spec/optics/n", 61), "spec.optics.n is 61: "),
         ("half a pixel", at("cameras/0/width_px", 260.5), "it should be a valid integer"),
         ("absurdly many cameras", at("cameras", [1] * 10**6), "cameras is [1, 1, 1, 1,"),
         ("cameras alike", at("cameras", lambda some: [*some, some[0]]), "differ"),
@@ -147,3 +150,23 @@ def test_a_folder_that_takes_no_verdict(
     assert main([str(export_folder), "-q"]) == 2
     assert "verify.json cannot be written" in capsys.readouterr().err
     assert [p.name for p in export_folder.iterdir() if p.name.startswith(".")] == []
+
+
+@pytest.mark.parametrize("read", [verify, read_export])
+@pytest.mark.parametrize("name", [*OTHER_RECORDS, "deep"])
+def test_is_refused_without_a_walk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, read: object
+) -> None:
+    (tmp_path / "deep").mkdir()
+    (tmp_path / name).touch()
+    if name != "deep":
+        (tmp_path / "manifest.json").touch()
+
+    def walk(*_: object) -> None:
+        pytest.fail("the folder was walked")
+
+    monkeypatch.setattr(os, "walk", walk)
+    words = OTHER_RECORDS.get(name, "a folder without design.json and manifest.json")
+    assert callable(read)
+    with pytest.raises(BadExport, match=f"{tmp_path} is {words}, no build: give the folder"):
+        read(tmp_path)
