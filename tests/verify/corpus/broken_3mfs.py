@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Callable
-from pathlib import Path
 
-from tests.verify.corpus.copies import put
-from tests.verify.corpus.facets import MODEL, edit_3mf, zipped
+from tests.verify.corpus.facets import MODEL, edit_3mf, edit_members
 from tests.verify.corpus.mutation import Job, Mutation, as_bytes, failing, refusing, together
 
 NAME = "shell_a.3mf"
@@ -29,12 +26,7 @@ def text(how: Callable[[str], str]) -> Job:
 
 
 def members(how: Callable[[dict[str, bytes]], dict[str, bytes]]) -> Job:
-    def job(folder: Path) -> None:
-        with zipfile.ZipFile(folder / NAME) as archive:
-            found = {item: archive.read(item) for item in archive.namelist()}
-        put(folder, NAME, zipped(how(found)))
-
-    return job
+    return lambda folder: edit_members(folder, NAME, how)
 
 
 def swapped(old: str, new: str) -> Job:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -35,26 +36,28 @@ def meshes_alone() -> None:
     """Every part of a build has all its files."""
 
 
-@pytest.fixture(scope="session")
-def good_prototype(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A small prototype as `tbcad build` writes it; tests break copies of it only."""
-    folder = tmp_path_factory.mktemp("corpus") / "prototype"
-    options = [word for setting in PROTOTYPE_SETTINGS for word in ("--set", setting)]
-    words = ["build", "--parts", "prototype", "--no-verify", *options, "--out", str(folder)]
-    assert run(words) == 0
+@contextmanager
+def built(folder: Path, settings: Sequence[str], *words: str) -> Iterator[Path]:
+    """A build that no test may write to."""
+    options = [word for setting in settings for word in ("--set", setting)]
+    assert run(["build", *words, *options, "--out", str(folder)]) == 0
     before = digests(folder)
     with remembered():
         yield folder
     assert digests(folder) == before, "a mutation wrote through a link"
+
+
+@pytest.fixture(scope="session")
+def good_prototype(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A small prototype as `tbcad build` writes it; tests break copies of it only."""
+    folder = tmp_path_factory.mktemp("corpus") / "prototype"
+    with built(folder, PROTOTYPE_SETTINGS, "--parts", "prototype", "--no-verify"):
+        yield folder
 
 
 @pytest.fixture(scope="session")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A small export as `tbcad build` writes and verifies it; tests break copies of it only."""
     folder = tmp_path_factory.mktemp("corpus") / "good"
-    options = [word for setting in SETTINGS for word in ("--set", setting)]
-    assert run(["build", "--parts", "shell", *options, "--out", str(folder)]) == 0
-    before = digests(folder)
-    with remembered():
+    with built(folder, SETTINGS, "--parts", "shell"):
         yield folder
-    assert digests(folder) == before, "a mutation wrote through a link"

@@ -62,30 +62,33 @@ def mesh_text(corners: Corners) -> str:
 def shared(corners: Corners) -> tuple[Corners, NDArray[np.intp]]:
     """Points (N, 3), each once, and (F, 3) which of them a facet's corners are."""
     flat = corners.reshape(-1, 3) + np.float32(0)
-    order = np.lexsort(flat.T)
-    new = np.append(True, (np.diff(flat[order], axis=0) != 0).any(axis=1))
-    index = np.empty(len(flat), np.intp)
-    index[order] = np.cumsum(new) - 1
-    return flat[order[new]], index.reshape(-1, 3)
+    points, index = np.unique(flat, axis=0, return_inverse=True)
+    return points, index.reshape(-1, 3)
 
 
 def edit_3mf(folder: Path, name: str, how: Callable[[str], str]) -> None:
     """Change the model's text in a 3MF."""
+
+    def other(members: dict[str, bytes]) -> dict[str, bytes]:
+        text = members[MODEL].decode()
+        changed = how(text)
+        assert changed != text, "nothing was changed"
+        return {**members, MODEL: changed.encode()}
+
+    edit_members(folder, name, other)
+
+
+def edit_members(
+    folder: Path, name: str, how: Callable[[dict[str, bytes]], dict[str, bytes]]
+) -> None:
+    """Change the members of a zip."""
     with zipfile.ZipFile(folder / name) as archive:
         members = {item: archive.read(item) for item in archive.namelist()}
-    text = members[MODEL].decode()
-    changed = how(text)
-    assert changed != text, "nothing was changed"
-    put(folder, name, zipped({**members, MODEL: changed.encode()}))
-
-
-def zipped(members: dict[str, bytes]) -> bytes:
-    """Members as a zip."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        for name, data in members.items():
-            archive.writestr(name, data)
-    return buffer.getvalue()
+        for item, data in how(members).items():
+            archive.writestr(item, data)
+    put(folder, name, buffer.getvalue())
 
 
 @dataclass(frozen=True)

@@ -12,28 +12,15 @@ import stat
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import fields
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import manifold3d
 from tbcad_verify.mesh.rays import RayScene
-from tbcad_verify.prototype import (
-    assembly,
-    bodies,
-    bodies_apart,
-    caps,
-    cut_checks,
-    fastener_checks,
-    measured_parts,
-    seats,
-    swing,
-)
-from tbcad_verify.prototype import stages as prototype_stages
 from tbcad_verify.prototype.bodies import Bodies, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.control import homing_checks, program_checks
-from tbcad_verify.prototype.light import lamp_light
 from tbcad_verify.prototype.light.ball_views import ray_transfer
 from tbcad_verify.prototype.light.lamp_light import EdgedBodies
 from tbcad_verify.prototype.light.pinhole_cells import mirror_spheres
@@ -41,39 +28,36 @@ from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
 from tbcad_verify.record.prototype import Lamps
-from tbcad_verify.run import stages
-from tbcad_verify.run import verify as verification
 from tbcad_verify.run.processes import Processes
-from tbcad_verify.shell import measured_shell
-from tbcad_verify.step import shell_checks, step_file
+from tbcad_verify.step import step_file
 from tbcad_verify.step.step_file import StepFile
 from tbcad_verify.types import Floats
 
 MAX_BYTES = 1 << 26  # of a file that is read to know whether it was read before
 # Of an export, what no result depends on that is kept by the export.
 NOT_DERIVED_FROM = {"folder", "manifest", "digests"}
-# Functions of their arguments alone, by module.
-PURE: dict[Any, tuple[str, ...]] = {
-    stages: ("same_check", "measure", "assess", "_set_up", "casing_checks"),
-    measured_shell: (
+# Functions of their arguments alone, by module of the verification.
+PURE: dict[str, tuple[str, ...]] = {
+    "run.stages": ("same_check", "measure", "assess", "_set_up", "casing_checks"),
+    "shell.measured_shell": (
         *("mesh_from_facets", "examine_topology", "mass_properties", "measure_edges", "recover"),
     ),
-    stages.coverage: ("measure",),
-    stages.pixels: ("checks",),
-    stages.mirrors_found: ("checks",),
-    verification: ("area_checks",),
-    shell_checks: ("wall", "cells_of_export"),
-    prototype_stages: ("measure_part", "join_meshes"),
-    bodies_apart: ("overlaps",),
-    measured_parts: ("manifold",),
-    assembly: ("manifold", "read_solids"),
-    bodies: ("indexed_mesh", "join_meshes", "build_scene"),
-    caps: ("fit_sphere",),
-    cut_checks: ("read_dxf",),
-    fastener_checks: ("_hole_spans",),
-    homing_checks: ("run_program",),
-    program_checks: ("run_klipper", "run_program"),
-    seats: ("_facets_near", "_pad", "distance_to_facets"),
+    "shell.coverage": ("measure",),
+    "shell.pixels": ("checks",),
+    "shell.mirrors_found": ("checks",),
+    "run.verify": ("area_checks",),
+    "step.shell_checks": ("wall", "cells_of_export"),
+    "prototype.stages": ("measure_part", "join_meshes"),
+    "prototype.bodies_apart": ("overlaps",),
+    "prototype.measured_parts": ("manifold",),
+    "prototype.assembly": ("manifold", "read_solids"),
+    "prototype.bodies": ("indexed_mesh", "join_meshes", "build_scene"),
+    "prototype.caps": ("fit_sphere",),
+    "prototype.cut_checks": ("read_dxf",),
+    "prototype.fastener_checks": ("_hole_spans",),
+    "prototype.control.homing_checks": ("run_program",),
+    "prototype.control.program_checks": ("run_klipper", "run_program"),
+    "prototype.seats": ("_facets_near", "_pad", "distance_to_facets"),
 }
 
 
@@ -83,19 +67,20 @@ def remembered() -> Iterator[None]:
 
     No file is read twice and no mesh put on printers; no balls are traced, no parts swept.
     """
-    keyed: tuple[tuple[Any, str, Callable[..., object]], ...] = (
-        (stages, "read_facets", _file_key),
-        (stages, "read_3mf", _file_key),
-        (prototype_stages, "assembly_meshes", _drawn_key),
-        (prototype_stages, "ball_views", _traced_key),
-        (swing, "axial_solid", _solid_key),
-        (swing, "sweep", _sweep_key),
-        (prototype_stages, "pixel_rays", _rays_key),
-        (lamp_light, "irradiance", _light_key),
+    keyed: tuple[tuple[str, str, Callable[..., object]], ...] = (
+        ("run.stages", "read_facets", _file_key),
+        ("run.stages", "read_3mf", _file_key),
+        ("prototype.stages", "assembly_meshes", _drawn_key),
+        ("prototype.stages", "ball_views", _traced_key),
+        ("prototype.swing", "axial_solid", _solid_key),
+        ("prototype.swing", "sweep", _sweep_key),
+        ("prototype.stages", "pixel_rays", _rays_key),
+        ("prototype.light.lamp_light", "irradiance", _light_key),
         *((module, name, _given) for module, names in PURE.items() for name in names),
     )
     with ExitStack() as stack:
-        for module, name, key in keyed:
+        for path, name, key in keyed:
+            module = import_module(f"tbcad_verify.{path}")
             once = _Once(getattr(module, name), key)
             stack.enter_context(mock.patch.object(module, name, once))
         each = _EachOnce(step_file.examine_all)

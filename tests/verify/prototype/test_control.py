@@ -122,80 +122,74 @@ def test_no_foreign_line_is_run(context: PrototypeContext, name: str) -> None:
         assert faults(context, name, changed), line
 
 
+PROGRAM_FAULTS = (
+    ("G92 X.*", "G92 X50.0000", "deg is beyond the swing"),
+    (r"M2\n\Z", "", "the program has no end"),
+    (r".\n\Z", "", "the last line is cut"),
+    (r"M0 \(MSG, turn.*\n", "", "pauses for pin, not for pin, turn"),
+    (
+        "(?=G92 X)",
+        "M0 (MSG, turn the object by 180 degrees about z, then resume)\n",
+        "photograph 1 with the object turned 1 times",
+    ),
+    (r"M0 \(MSG, zero.*\n", "", "before the zero pin is told"),
+    (r"\$H\n", "", "before a person has put the base"),
+    (r"\$H\n", "M64 P1\n$H\n", "with a light on"),
+    (r"\$H\n", "$H\n$H\n", "homes"),
+    ("G4 P0.500", "G4 P0.100", "photograph 1 0.2 s after the motion"),
+    (r"(?s)(.*)G4 P0.500", r"\1G4 P0.100", "0.2 s after the motion"),
+    (r"M65 P0\n(?=\(stop)", "", "moves while a light is on"),
+    (r"M64 P1\n", "", "outputs none on, not [1]"),
+    (r"M64 P1\nG4 P0.100\n", "M64 P1\n", "was switched"),
+    (r"G4 P1.000\nM65 P1\n", "M65 P1\nG4 P1.000\n", "photograph 2 0 s before the next motion"),
+    (r"M9\nG4 P1.000\nM65 P1\n", "M65 P1\nM9\nG4 P1.000\n", "while the camera's release is on"),
+    (r"M64 P1\n", "M64 P1\nM64 P1\n", "turns output 1 on twice"),
+    (r"M2\n\Z", "M64 P0\nM2\n", "ends while a light is on"),
+    (r"(?s)(.*)M9\n", r"\1", "moves while the camera's release is on"),
+    (r"M8\n", "", "is not on"),
+    (r"G4 P0.200\n", "", "with the release on for 0 s"),
+    (r"G4 P1.000\n", "", "0 s before the next motion"),
+    (" F900", "", "moves without a speed"),
+    ("F900", "F0", "moves without a speed"),
+    ("F900", "F90000", "a speed of 90000"),
+    (r"G21.*\n", "", "before units and distance mode are set"),
+    ("M9\n", "M9\nG4 P0.500\nM8\nG4 P0.200\nM9\n", "photographs, not"),
+    (r"(stop 2 .*\n)", r"\1G1 X40.0000\n", "is approached from above"),
+    (r"\(stop 2 of", "(stop 3 of", "another comment than its stop"),
+    (r"(?s)(.*)G1 X0.0000", r"\1G1 X1.0000", "does not end at home_deg"),
+    (r"(stop 2 .*\nG1 X).*", r"\g<1>0.0100", "photograph 4 at"),
+)
+KLIPPER_FAULTS = (
+    (r'RESPOND MSG="zero.*\nPAUSE\n', "", "before the zero pin is told to be out"),
+    ("zero pin out", "zero pin in", "is none that a plan has"),
+    (r".*ENABLE=1 .*\n", "", "before the motor is on"),
+    (r".*STOP_ON_ENDSTOP=1\n", "", "before a person has put the base"),
+    (r".*SET_POSITION=-.*\n", "", "moves without a known coordinate"),
+    ("SET_POSITION=-\\S+", "SET_POSITION=-50", "deg is beyond the swing"),
+    (r"SPEED=15", "SPEED=1500", "a speed of 90000"),
+    (r"(SET_POSITION=-.*\n.*SPEED=)\d+", r"\g<1>60", "drives off the switch"),
+    (r"(SET_POSITION=-.*\n.*MOVE=)\S+", r"\g<1>150", "drives off the switch"),
+    (r"SET_PIN PIN=lamp VALUE=0\n(?=; stop)", "", "moves while a light is on"),
+    (r'RESPOND MSG="turn.*\nPAUSE\n', "", "pauses for pin, not for pin, turn"),
+    (r"G4 P500\n", "G4 P50\n", "s after the motion"),
+    (r"\Z", "SET_PIN PIN=lamp VALUE=1\n", "ends while a light is on"),
+)
+
+
 @pytest.mark.parametrize(
-    ("pattern", "new", "words"),
+    ("name", "pattern", "new", "words"),
     [
-        ("G92 X.*", "G92 X50.0000", "deg is beyond the swing"),
-        (r"M2\n\Z", "", "the program has no end"),
-        (r".\n\Z", "", "the last line is cut"),
-        (r"M0 \(MSG, turn.*\n", "", "pauses for pin, not for pin, turn"),
-        (
-            "(?=G92 X)",
-            "M0 (MSG, turn the object by 180 degrees about z, then resume)\n",
-            "photograph 1 with the object turned 1 times",
-        ),
-        (r"M0 \(MSG, zero.*\n", "", "before the zero pin is told"),
-        (r"\$H\n", "", "before a person has put the base"),
-        (r"\$H\n", "M64 P1\n$H\n", "with a light on"),
-        (r"\$H\n", "$H\n$H\n", "homes"),
-        ("G4 P0.500", "G4 P0.100", "photograph 1 0.2 s after the motion"),
-        (r"(?s)(.*)G4 P0.500", r"\1G4 P0.100", "0.2 s after the motion"),
-        (r"M65 P0\n(?=\(stop)", "", "moves while a light is on"),
-        (r"M64 P1\n", "", "outputs none on, not [1]"),
-        (r"M64 P1\nG4 P0.100\n", "M64 P1\n", "was switched"),
-        (r"G4 P1.000\nM65 P1\n", "M65 P1\nG4 P1.000\n", "photograph 2 0 s before the next motion"),
-        (r"M9\nG4 P1.000\nM65 P1\n", "M65 P1\nM9\nG4 P1.000\n", "while the camera's release is on"),
-        (r"M64 P1\n", "M64 P1\nM64 P1\n", "turns output 1 on twice"),
-        (r"M2\n\Z", "M64 P0\nM2\n", "ends while a light is on"),
-        (r"(?s)(.*)M9\n", r"\1", "moves while the camera's release is on"),
-        (r"M8\n", "", "is not on"),
-        (r"G4 P0.200\n", "", "with the release on for 0 s"),
-        (r"G4 P1.000\n", "", "0 s before the next motion"),
-        (" F900", "", "moves without a speed"),
-        ("F900", "F0", "moves without a speed"),
-        ("F900", "F90000", "a speed of 90000"),
-        (r"G21.*\n", "", "before units and distance mode are set"),
-        ("M9\n", "M9\nG4 P0.500\nM8\nG4 P0.200\nM9\n", "photographs, not"),
-        (r"(stop 2 .*\n)", r"\1G1 X40.0000\n", "is approached from above"),
-        (r"\(stop 2 of", "(stop 3 of", "another comment than its stop"),
-        (r"(?s)(.*)G1 X0.0000", r"\1G1 X1.0000", "does not end at home_deg"),
-        (r"(stop 2 .*\nG1 X).*", r"\g<1>0.0100", "photograph 4 at"),
+        *(("program", *row) for row in PROGRAM_FAULTS),
+        *(("klipper", *row) for row in KLIPPER_FAULTS),
     ],
 )
 def test_what_is_wrong_with_a_program_is_said(
-    context: PrototypeContext, pattern: str, new: str, words: str
+    context: PrototypeContext, name: str, pattern: str, new: str, words: str
 ) -> None:
-    text = context.prototype.program
+    text = getattr(context.prototype, name)
     changed = re.sub(pattern, new, text, count=1)
     assert changed != text
-    assert words in faults(context, "program", changed)
-
-
-@pytest.mark.parametrize(
-    ("pattern", "new", "words"),
-    [
-        (r'RESPOND MSG="zero.*\nPAUSE\n', "", "before the zero pin is told to be out"),
-        ("zero pin out", "zero pin in", "is none that a plan has"),
-        (r".*ENABLE=1 .*\n", "", "before the motor is on"),
-        (r".*STOP_ON_ENDSTOP=1\n", "", "before a person has put the base"),
-        (r".*SET_POSITION=-.*\n", "", "moves without a known coordinate"),
-        ("SET_POSITION=-\\S+", "SET_POSITION=-50", "deg is beyond the swing"),
-        (r"SPEED=15", "SPEED=1500", "a speed of 90000"),
-        (r"(SET_POSITION=-.*\n.*SPEED=)\d+", r"\g<1>60", "drives off the switch"),
-        (r"(SET_POSITION=-.*\n.*MOVE=)\S+", r"\g<1>150", "drives off the switch"),
-        (r"SET_PIN PIN=lamp VALUE=0\n(?=; stop)", "", "moves while a light is on"),
-        (r'RESPOND MSG="turn.*\nPAUSE\n', "", "pauses for pin, not for pin, turn"),
-        (r"G4 P500\n", "G4 P50\n", "s after the motion"),
-        (r"\Z", "SET_PIN PIN=lamp VALUE=1\n", "ends while a light is on"),
-    ],
-)
-def test_what_is_wrong_with_a_klipper_program_is_said(
-    context: PrototypeContext, pattern: str, new: str, words: str
-) -> None:
-    text = str(context.prototype.klipper)
-    changed = re.sub(pattern, new, text, count=1)
-    assert changed != text
-    assert words in faults(context, "klipper", changed)
+    assert words in faults(context, name, changed)
 
 
 def test_no_setting_may_go_come_twice_or_be_another(context: PrototypeContext) -> None:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from importlib import import_module
 from io import StringIO
-from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -22,9 +20,7 @@ from tbcad_verify.report.methods import (
     LABEL_WIDTH,
     UNKNOWN,
     key_figures,
-    method_of,
     methods,
-    prototype_stages,
     remedy_by_name,
 )
 from tbcad_verify.report.report import Output, Report
@@ -210,14 +206,9 @@ def test_colour_is_for_terminals(shell_report: Report) -> None:
     assert shown(failing, terminal=True).startswith("\x1b[1;31mFAIL")
 
 
-def test_every_check_has_a_remedy_that_fits(shell_report: Report) -> None:
-    names = [check.name for check in shell_report.checks if check.limit is not None]
-    for module in chain.from_iterable(prototype_stages().values()):
-        names += import_module(f"tbcad_verify.prototype.{module}").CHECKS
-    assert [name for name in names if method_of(name) is None] == []
+def test_every_remedy_fits() -> None:
     every = [text for one in methods() for text in one.remedies]
-    for text in (*every, UNKNOWN, ELSE):
-        assert len(f"    -> {text}") <= WIDTH
+    assert max(len(f"    -> {text}") for text in (*every, UNKNOWN, ELSE)) <= WIDTH
 
 
 @pytest.mark.parametrize("words", [["--full", "--quiet"], ["--json", "-q"], ["--json", "--full"]])
