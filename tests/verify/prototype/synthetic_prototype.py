@@ -16,6 +16,7 @@ from typing import Any
 import manifold3d
 import numpy as np
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from tbcad.cad.formats.glb import ColouredMesh, write_glb
 from tbcad.cad.kernel.mesh import Mesh
@@ -97,9 +98,7 @@ def angles(u: np.ndarray) -> np.ndarray:
 
 
 def turned(x: np.ndarray, angle: float) -> np.ndarray:
-    along, zero, third = x @ frame().T
-    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    return np.array([along, c * zero - s * third, s * zero + c * third]) @ frame()
+    return np.asarray(Rotation.from_rotvec(np.radians(angle) * frame()[0]).apply(x))
 
 
 @dataclass
@@ -180,12 +179,8 @@ def cap(spec: SyntheticPrototype, ball: Ball) -> Any:
     start = np.arctan2(EDGE, depth - radius * (1 - np.cos(rim)))
     body = np.linspace(start, np.pi, 60)[1:]
     up = radius * np.cos(front) - ball.radius + depth
-    line = np.vstack(
-        [
-            np.stack([radius * np.sin(front), up], axis=1),
-            ball.body * np.stack([np.sin(body[:-1]), np.cos(body[:-1])], axis=1),
-        ]
-    )
+    behind = ball.body * np.stack([np.sin(body[:-1]), np.cos(body[:-1])], axis=1)
+    line = np.vstack([np.stack([radius * np.sin(front), up], axis=1), behind])
     return lathe(line, depth + spec.grown, -ball.body, ball.b, ball.n)
 
 
@@ -353,13 +348,9 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
             "pin": "ROD-4x40",
             "zero_error_deg": 0.7,
         },
-        "fasteners": [],
-        "assembly_steps": [],
+        **{key: [] for key in ("fasteners", "assembly_steps", "drawings", "caps")},
         "bought": [{"name": "motor", "part": "NEMA17-40", "turns": False, "finish": None}],
-        "lamps": None,
-        "shroud": None,
-        "drawings": [],
-        "caps": [],
+        **dict.fromkeys(("lamps", "shroud")),
         "assembly": {"glb": "whole.glb"},
     }
     return found, files

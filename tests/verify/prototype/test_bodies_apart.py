@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import manifold3d
 import numpy as np
@@ -13,22 +13,11 @@ from tbcad_verify.prototype.assembly import Shape, all_solids
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.report.checks import Check, check_names
 
-from tests.verify.prototype.screws import screw
+from tests.verify.prototype.screws import box, screw, shape
 
 FINE = 96
 PARTS = {"washer": "WASHER-5", "head": "M5x16", "screw": "M3x12", "dowel": "DOWEL-3x10"}
 PARTS |= {"insert_1": "INSERT-M3", "insert_2": "INSERT-M3"}
-
-
-def shape(solid: Any) -> Shape:
-    mesh = solid.to_mesh64()
-    faces = np.array(mesh.tri_verts, dtype=np.int64, order="C")
-    return np.array(mesh.vert_properties[:, :3]), faces
-
-
-def box(*low_high: float) -> Shape:
-    low, high = np.array(low_high[:3]), np.array(low_high[3:])
-    return shape(manifold3d.Manifold.cube(high - low).translate(low))
 
 
 def rod(radius: float, low: float, high: float, x: float = 0.0, y: float = 0.0) -> Shape:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any, cast
 
+import manifold3d
 import numpy as np
 import pytest
-import trimesh
 from scipy.spatial.transform import Rotation
 from tbcad_verify.prototype import key_access
 from tbcad_verify.prototype.assembly import Shape
@@ -17,21 +17,16 @@ from tbcad_verify.record.prototype import AssemblyStep, PlacedFastener
 from tbcad_verify.report.checks import check_names
 
 from tbcad.prototype.purchased.parts import load_parts
-from tests.verify.prototype.screws import screw
+from tests.verify.prototype.screws import box, screw, shape
 
 KEY_RADIUS, KEY_END = 4.53 / 2, 5.0 + 74.0
 
 
-def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Shape:
-    mesh = trimesh.creation.box(bounds=[low, high])
-    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
-
-
 def hood(low: float, high: float, width: float) -> Shape:
     """A round tube about the key, 6 mm thick, of an inner width."""
-    tube = trimesh.creation.annulus(width / 2, width / 2 + 6, high - low)
-    tube.apply_translation([0, 0, (low + high) / 2])
-    return np.asarray(tube.vertices), np.asarray(tube.faces)
+    radii = width / 2 + 6, width / 2
+    outer, inner = (manifold3d.Manifold.cylinder(high - low, r, r, 32) for r in radii)
+    return shape((outer - inner).translate([0, 0, low]))
 
 
 def unreached(
@@ -55,7 +50,7 @@ def unreached(
         prototype=record,
         base_rotation=lambda angle: Rotation.from_rotvec(angle[:, None] * [1.0, 0.0, 0.0]),
     )
-    plate, body = box((-20, -20, -10), (20, 20, 0)), box((-4, -4, -9), (4, 4, 5))
+    plate, body = box(-20, -20, -10, 20, 20, 0), box(-4, -4, -9, 4, 4, 5)
     drawn = {"plate": plate, one.name: body, **bodies}
     names = check_names(key_access.CHECKS, "prototype.json")
     (check,) = key_access.checks(names, cast(PrototypeContext, context), drawn)
@@ -65,7 +60,7 @@ def unreached(
 
 def wall(near: float, low: float, high: float) -> dict[str, Shape]:
     """A wall beside the key, from x = near on, between two heights."""
-    return {"wall": box((near, -5, low), (near + 5, 5, high))}
+    return {"wall": box(near, -5, low, near + 5, 5, high)}
 
 
 def test_tbcads_screws_have_keys() -> None:
@@ -106,7 +101,7 @@ def test_a_wall_in_the_way(near: float, low: float, high: float, reached: bool) 
 
 def test_the_short_arm_needs_room_for_the_long_one_to_turn() -> None:
     """A roof at 40 mm stops the long arm; a tube up to it stops the short one, too."""
-    roof = {"roof": box((-90, -90, 40), (90, 90, 50))}
+    roof = {"roof": box(-90, -90, 40, 90, 90, 50)}
     assert unreached(roof) == ""
     assert unreached(roof | {"tube": hood(0, 39, 12)}) == "M5x16_1 behind roof"
     assert unreached(roof | {"tube": hood(0, 25, 12)}) == ""
@@ -123,8 +118,8 @@ def test_what_is_mounted_later_is_not_in_the_way() -> None:
 def test_a_base_that_turns_out_of_the_way() -> None:
     """A wall of 5 mm at 20 mm height leaves the key after some degrees; a wide one does not."""
     joined = {"one": ("plate", "wall", "shaft"), "two": ("M5x16_1",)}
-    shaft = {"shaft": box((90, 0, 0), (91, 1, 1))}
-    wide = {"wall": box((-50, -100, 20), (50, 100, 25))}
+    shaft = {"shaft": box(90, 0, 0, 91, 1, 1)}
+    wide = {"wall": box(-50, -100, 20, 50, 100, 25)}
     assert unreached(wall(-2, 20, 25) | shaft, joined, ("wall",)) == ""
     assert unreached(wall(-2, 20, 25) | shaft, joined) == "M5x16_1 behind wall"
     behind = unreached(wide | shaft, joined, ("wall",))
@@ -132,7 +127,7 @@ def test_a_base_that_turns_out_of_the_way() -> None:
 
 
 def test_the_base_is_not_there_before_its_shaft() -> None:
-    wide = {"wall": box((-50, -100, 20), (50, 100, 25)), "shaft": box((90, 0, 0), (91, 1, 1))}
+    wide = {"wall": box(-50, -100, 20, 50, 100, 25), "shaft": box(90, 0, 0, 91, 1, 1)}
     steps = {"one": ("plate", "wall", "disc", "JOINT_1"), "two": ("M5x16_1",), "three": ("shaft",)}
     joint = screw(name="JOINT_1", part="DOWEL-3x16", through=["wall", "disc"], turns=True)
     assert unreached(wide, steps, ("wall",), joint) == ""
