@@ -37,19 +37,22 @@ def gone_soon(pid: int) -> bool:
     return not is_alive(pid)
 
 
-def test_a_good_end(tmp_path: Path) -> None:
-    done = python(tmp_path, "import sys; print('out'); print('err', file=sys.stderr); sys.exit(7)")
-    assert (done.code, done.reason) == (7, "")
-    assert sorted(done.text.split()) == ["err", "out"]
-    assert done.seconds > 0
-
-
-def test_hanging_is_cut_short(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("body", "seconds", "end", "said"),
+    [
+        ("sys.stderr.write('err '); print('out'); sys.exit(7)", 300, (7, ""), ["err", "out"]),
+        ("os.kill(os.getpid(), 11)", 300, (None, "crashed (SIGSEGV)"), []),
+        ("print('soon', flush=True); time.sleep(900)", 2, (None, LATE), ["soon"]),
+    ],
+)
+def test_ends_are_told(
+    tmp_path: Path, body: str, seconds: float, end: tuple[int | None, str], said: list[str]
+) -> None:
     start = time.monotonic()
-    done = python(tmp_path, "import time; print('soon', flush=True); time.sleep(900)", Limits(2))
-    assert time.monotonic() - start < 600
-    assert (done.code, done.reason) == (None, LATE)
-    assert done.text == "soon\n"
+    done = python(tmp_path, f"import os, sys, time; {body}", Limits(seconds))
+    assert (done.code, done.reason) == end
+    assert sorted(done.text.split()) == said
+    assert 0 < done.seconds <= time.monotonic() - start < 600
 
 
 SPAWN = """
@@ -67,11 +70,6 @@ def test_grandchildren_do_not_outlive_a_child(tmp_path: Path, rest: str, reason:
     assert done.reason == reason
     assert time.monotonic() - start < 600
     assert gone_soon(int(done.text))
-
-
-def test_a_crash_is_named(tmp_path: Path) -> None:
-    done = python(tmp_path, "import os; os.kill(os.getpid(), 11)")
-    assert (done.code, done.reason) == (None, "crashed (SIGSEGV)")
 
 
 def test_printing_has_an_end(tmp_path: Path) -> None:
