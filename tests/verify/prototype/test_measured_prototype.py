@@ -22,13 +22,14 @@ from tbcad_verify.prototype.light import ball_views, pinhole_cells
 from tbcad_verify.prototype.measured_parts import MeasuredPart, measure_part, of_roles
 from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
+from tbcad_verify.record.prototype import RECORD
 from tbcad_verify.report.checks import check_names
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.step.step_file import StepFile, examine_all, load, read_step_files
 
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
-from tests.exported_files import edit_json
+from tests.verify.corpus.mutation import at
 from tests.verify.prototype import synthetic_prototype
 from tests.verify.prototype.synthetic_prototype import (
     SyntheticPrototype,
@@ -277,14 +278,8 @@ def stepped(folder: Path, low: list[float], high: list[float]) -> Path:
     """Give the stage a STEP file of a box."""
     box = BRepPrimAPI_MakeBox(gp_Pnt(*low), gp_Pnt(*high)).Solid()
     write_step(folder / "stage.step", Solid("stage", box, ()))
-    edit_json(
-        folder / "prototype.json",
-        lambda record: next(part for part in record["parts"] if part["name"] == "stage").update(
-            step="stage.step"
-        ),
-    )
-    mesh = {"chord_error_mm": 0.01, "structure_error_mm": 0.02}
-    edit_json(folder / "design.json", lambda design: design["spec"]["mesh"].update(mesh))
+    at("parts/stage/step", "stage.step", RECORD)(folder)
+    at("spec/mesh", {"chord_error_mm": 0.01, "structure_error_mm": 0.02})(folder)
     return sign(folder)
 
 

@@ -15,7 +15,9 @@ from tbcad_verify.record.prototype import read_prototype
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.report import Report
 
-from tests.exported_files import Rows, contents, edit_csv, edit_json
+from tests.exported_files import Rows, contents
+from tests.verify.corpus.broken_prototypes import record, table
+from tests.verify.corpus.mutation import Job, together
 from tests.verify.optical_setups import IN_PROCESS
 from tests.verify.prototype.synthetic_prototype import (
     NOT_MADE,
@@ -42,16 +44,6 @@ def judged(report: Report) -> Report:
     """A report without the checks of what the synthetic prototype has not."""
     assert {check.name for check in report.checks} >= NOT_MADE - {"radius rule"}
     return replace(report, checks=tuple(c for c in report.checks if c.name not in NOT_MADE))
-
-
-def edited(folder: Path, change: Callable[[Row], None]) -> Path:
-    edit_json(folder / "prototype.json", change)
-    return sign(folder)
-
-
-def table(folder: Path, name: str, change: Callable[[Rows], object]) -> Path:
-    edit_csv(folder / name, change)
-    return sign(folder)
 
 
 def moved(row: dict[str, str], name: str, by: float) -> None:
@@ -103,57 +95,39 @@ def stop_nudged(rows: Rows) -> None:
             row["base_angle_deg"] = repr(float(row["base_angle_deg"]) + 1e-3)
 
 
-def put(value: Any, path: tuple[Any, ...], to: Any) -> None:
-    for key in path[:-1]:
-        value = value[key]
-    value[path[-1]] = to(value[path[-1]]) if callable(to) else to
-
-
-def in_record(*path: Any, to: Any) -> Callable[[Path], Path]:
-    return lambda folder: edited(folder, lambda value: put(value, path, to))
-
-
-def in_table(name: str, change: Callable[[Rows], object]) -> Callable[[Path], Path]:
-    return lambda folder: table(folder, name, change)
-
-
-def ball(number: int, change: Callable[[dict[str, str]], object]) -> Callable[[Path], Path]:
-    return in_table("balls.csv", lambda rows: change(rows[number - 1]))
+def ball(number: int, change: Callable[[dict[str, str]], object]) -> Job:
+    return table("balls.csv", lambda rows: change(rows[number - 1]))
 
 
 PLAN, ANGLE = "rotation_plan.csv", "base_angle_deg"
 FIN = 0.5 * make_balls(SyntheticPrototype())[1].p  # half way from the object to a ball
 # How, which checks may fail (the first must), and a word of its detail.
-RECORDS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...], str]] = {
+RECORDS: dict[str, tuple[Job, tuple[str, ...], str]] = {
     "apex off": (ball(1, lambda row: moved(row, "p", 1e-6)), ("ball positions",), "ball 1"),
     "larger than stock": (ball(1, lambda r: r.update(diameter_mm="10.1")), ("ball sizes",), "ball"),
     "without weight": (ball(1, lambda r: r.update(mass_g="0.001")), ("ball sizes",), "ball 1"),
-    "mirror missing in the plan": (in_table(PLAN, row_of("a0007")), ("plan", *ON_STOPS), "a0007"),
-    "twin missing": (in_table(PLAN, row_of("b0007")), ("plan",), "b0007"),
-    "twins exchanged": (in_table(PLAN, exchanged), ("plan",), "b0007"),
-    "angle off": (in_table(PLAN, nudged(ANGLE, 1e-3)), ("plan",), "row 4"),
+    "mirror missing in the plan": (table(PLAN, row_of("a0007")), ("plan", *ON_STOPS), "a0007"),
+    "twin missing": (table(PLAN, row_of("b0007")), ("plan",), "b0007"),
+    "twins exchanged": (table(PLAN, exchanged), ("plan",), "b0007"),
+    "angle off": (table(PLAN, nudged(ANGLE, 1e-3)), ("plan",), "row 4"),
     "stops and plan agree on a wrong angle": (
-        lambda folder: table(table(folder, "stops.csv", stop_nudged), PLAN, stop_nudged),
+        together(table("stops.csv", stop_nudged), table(PLAN, stop_nudged)),
         ("plan program",),
         "deg",
     ),
     "a stop beyond the swing": (
-        in_record("swing_deg", to=lambda swing: [swing[0], swing[1] - 1e-6]),
+        record("swing_deg", lambda swing: [swing[0], swing[1] - 1e-6]),
         ("plan", "plan program"),
         "beyond the swing",
     ),
     "pose mirrored": (
-        in_record("parts", 4, "axes", to=lambda axes: [[-x for x in row] for row in axes]),
+        record("parts/4/axes", lambda axes: [[-x for x in row] for row in axes]),
         ("print pose",),
         "no rotation",
     ),
-    "light outside": (
-        in_record("leds", 0, "position_mm", to=[0.0, 0.0, -13.0]),
-        ("leds inside",),
-        "led_1",
-    ),
+    "light outside": (record("leds/0/position_mm", [0.0, 0.0, -13.0]), ("leds inside",), "led_1"),
     "no cap for its ball": (
-        in_record("parts", 1, "ball", to=2),
+        record("parts/1/ball", 2),
         ("cap fronts", "cap bodies", "cap form", *ON_BALLS),
         "no sphere",
     ),
@@ -211,7 +185,8 @@ def fails_for(folder: Path, names: tuple[str, ...], words: str) -> None:
 @pytest.mark.parametrize("how", RECORDS)
 def test_a_broken_record_fails(prototype_folder: Path, how: str) -> None:
     change, names, words = RECORDS[how]
-    fails_for(change(prototype_folder), names, words)
+    change(prototype_folder)
+    fails_for(sign(prototype_folder), names, words)
 
 
 @pytest.mark.parametrize("how", PROTOTYPES)
@@ -240,19 +215,19 @@ def test_a_machine_that_cannot_make_the_parts_fails(prototype_folder: Path) -> N
     assert {c.file for c in report.checks if c.name == "print sla" and not c.passed} >= {"foot.stl"}
 
 
-REFUSED: dict[str, tuple[Callable[[Path], Any], str]] = {
+REFUSED: dict[str, tuple[Job, str]] = {
     "schema before": (
-        in_record("schema", to="tbcad-prototype/1"),
+        record("schema", "tbcad-prototype/1"),
         "schema is tbcad-prototype/1, this version verifies tbcad-prototype/2; write",
     ),
-    "many balls": (in_table("balls.csv", lambda rows: rows.extend(rows * 400)), "1604 rows"),
-    "ball missing": (in_table("balls.csv", list.pop), "one for each ball"),
+    "many balls": (table("balls.csv", lambda rows: rows.extend(rows * 400)), "1604 rows"),
+    "ball missing": (table("balls.csv", list.pop), "one for each ball"),
     "ball kind": (
         ball(2, lambda row: row.update(kind="cube")),
         "line 3: kind is cube: it should be 'ball' or 'cap'",
     ),
-    "mesh twice": (in_record("parts", 0, "stl", to="stage.stl"), "STL of their own"),
-    "cap of no ball": (in_record("parts", 1, "ball", to=9), "a cap's ball or null"),
+    "mesh twice": (record("parts/0/stl", "stage.stl"), "STL of their own"),
+    "cap of no ball": (record("parts/1/ball", 9), "a cap's ball or null"),
     "program no text": (lambda f: (f / "rotation_plan.nc").write_bytes(b"\xff\xfe"), "UTF-8"),
 }
 
@@ -266,12 +241,12 @@ def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 def test_no_field_of_the_record_may_be_of_another_kind(prototype_folder: Path) -> None:
     """All of the synthetic record is used; the refusal names the field."""
     path = prototype_folder / "prototype.json"
-    record = path.read_text()
-    for place in leaves(json.loads(record)):
-        edit_json(path, lambda value, at=place: put(value, at, {"no": "value"}))
+    whole = path.read_text()
+    for place in leaves(json.loads(whole)):
+        record("/".join(map(str, place)), {"no": "value"})(prototype_folder)
         with pytest.raises(BadExport, match=str(place[0])):
             read_prototype(prototype_folder, {"a", "b"})
-        path.write_text(record)
+        path.write_text(whole)
 
 
 @pytest.mark.parametrize("how", REFUSED)
