@@ -18,7 +18,7 @@ from tbcad_verify.run.processes import Processes
 from tbcad_verify.shell.integrity import mesh_ends_checks
 from tbcad_verify.shell.measured_shell import measure_shells
 from tbcad_verify.step.kernel.reading import transferred
-from tbcad_verify.step.shell_checks import shell_comparisons, shell_step_checks
+from tbcad_verify.step.shell_checks import compare_all, front_step_checks
 from tbcad_verify.step.step_file import read_step_files
 
 from tbcad.cad.formats.step import write_step
@@ -99,8 +99,8 @@ def step_ends(folder: Path) -> Check:
     record = read_export(folder)
     record = replace(record, parts=record.parts[:1])
     with Processes(1, 120) as processes:
-        comparisons = shell_comparisons(record, read_step_files(record, processes))
-    checks = shell_step_checks(record, {}, comparisons, None, ())
+        fronts = compare_all(record, read_step_files(record, processes))
+    checks = front_step_checks(record, record.parts, {}, fronts)
     return next(check for check in checks if check.name == "step seam and foot")
 
 

@@ -193,17 +193,16 @@ def round_face(table: StepTable, face: int) -> RoundFace | None:
 
 @dataclass(frozen=True)
 class Casing:
-    """Back and holes of one shell."""
+    """The back of one shell."""
 
     semi_axes: tuple[float, float]  # of the back along the axis and across it, mm
     centre: Floats  # (3,) of the back, mm
     axis: Floats  # (3,) unit, of the back
     valleys: Floats  # (V, 3) corners of the mirrors and of the walls below them, mm
-    holes: tuple[Hole, ...]  # round, by diameter, from the spec
 
 
 def read_casing(table: StepTable, mirrors: frozenset[str]) -> Casing:
-    """Find the back, the mirrors' corners and all round holes.
+    """Find the back and the mirrors' corners.
 
     Unknown: there is no back, more than one, or no spheroid.
     """
@@ -218,7 +217,7 @@ def read_casing(table: StepTable, mirrors: frozenset[str]) -> Casing:
     corners = [one for one in table.reached(*faces) if table.kinds.get(one) == "VERTEX_POINT"]
     valleys = [table.triple(table.references(one)[0]) for one in sorted(corners)]
     at = np.array(valleys).reshape(-1, 3)
-    return Casing((major, minor), *table.placement(place), at, bores(table, mirrors))
+    return Casing((major, minor), *table.placement(place), at)
 
 
 def bores(table: StepTable, mirrors: frozenset[str]) -> tuple[Hole, ...]:
