@@ -45,7 +45,7 @@ from tbcad_verify.run import stages
 from tbcad_verify.run import verify as verification
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.shell import measured_shell
-from tbcad_verify.step import shell_checks, step_file
+from tbcad_verify.step import front_checks, shell_checks, step_file
 from tbcad_verify.step.step_file import StepFile
 from tbcad_verify.types import Floats
 
@@ -62,7 +62,8 @@ PURE: dict[Any, tuple[str, ...]] = {
     stages.pixels: ("checks",),
     stages.mirrors_found: ("checks",),
     verification: ("area_checks",),
-    shell_checks: ("wall", "cells_of_export"),
+    front_checks: ("cells_of_export",),
+    shell_checks: ("wall",),
     prototype_stages: ("measure_part", "join_meshes"),
     bodies_apart: ("overlaps",),
     measured_parts: ("manifold",),
