@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tbcad_verify.mesh.mesh import Mesh
 from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.printing.assessment import assess, print_check, to_row
-from tbcad_verify.printing.orientations import best_rotation, silhouette
+from tbcad_verify.printing.orientations import best_rotation, hull_view
 from tbcad_verify.printing.part_measures import PartMeasures
 from tbcad_verify.printing.placement import overhang_area, place, pose_text
 from tbcad_verify.printing.profile import Profile, load
@@ -112,7 +112,7 @@ def test_no_turn_beats_the_one_found(
 ) -> None:
     """Against every twentieth of a degree."""
     flat = np.array([*corners, (-9, -8), (9, -7), (8, 9)]).T
-    angle, sides = best_rotation(silhouette(flat), width, depth, 1e-9)
+    angle, sides = best_rotation(hull_view(np.vstack([flat, flat[:1]]), DOWN), width, depth, 1e-9)
     tried = np.linspace(0, np.pi, 3601)
     x = np.cos(tried)[:, None] * flat[0] - np.sin(tried)[:, None] * flat[1]
     y = np.sin(tried)[:, None] * flat[0] + np.cos(tried)[:, None] * flat[1]
