@@ -9,7 +9,7 @@ from tbcad_verify.mesh.mesh import indexed_mesh
 from tbcad_verify.mesh.segments import Segmentation
 from tbcad_verify.mesh.surfaces import (
     Surfaces,
-    miss_distances,
+    nearest_to_origin,
     prepare_for_rays,
     reflect,
 )
@@ -50,7 +50,7 @@ def test_reflection_off_a_sphere_on_the_axis(angle: float) -> None:
     out = view + 2 * angle
     np.testing.assert_allclose(unit(lines.toward)[:, 0], [np.sin(out), 0, np.cos(out)], atol=1e-13)
     expected = abs(hit[0] * np.cos(out) - hit[2] * np.sin(out))
-    assert miss_distances(lines)[0] == pytest.approx(expected, abs=1e-12)
+    assert norm(nearest_to_origin(lines))[0] == pytest.approx(expected, abs=1e-12)
     assert lines.reach[0] == pytest.approx(1)
 
 

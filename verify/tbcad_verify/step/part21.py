@@ -84,6 +84,13 @@ class StepTable:
         """First text of an entity: its name."""
         return str(LABEL.findall(self.bodies[number])[0])[1:-1].replace("''", "'")
 
+    def product(self, definition: int) -> str:
+        """Name of what a product definition defines. ValueError: it is no product."""
+        product = self.references(self.references(definition)[0])[0]
+        if self.kinds[product] != "PRODUCT":
+            raise ValueError(f"#{definition} defines no product")
+        return self.label(product)
+
     def forward(self, face: int) -> bool:
         """Whether a face has its surface's sense."""
         return self.bodies[face].rstrip().endswith(".T.")

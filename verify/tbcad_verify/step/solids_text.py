@@ -62,7 +62,7 @@ def read_solids(text: str) -> dict[str, TextSolid]:
         refuse_foreign(table)
         _refuse_moved(table)
         solids = [
-            (_product(table, shape), solid)
+            (table.product(table.references(shape)[-1]), solid)
             for shape, representation in map(
                 table.references, table.of("SHAPE_DEFINITION_REPRESENTATION")
             )
@@ -148,15 +148,6 @@ def _refuse_moved(table: StepTable) -> None:
             triples = [table.triple(one) for one in table.references(place)]
             if not np.array_equal(np.array(triples) + 0.0, np.array(UNMOVED)):
                 raise Unknown("the assembly moves a part")
-
-
-def _product(table: StepTable, shape: int) -> str:
-    definition = table.references(shape)[-1]
-    formation = table.references(definition)[0]
-    product = table.references(formation)[-1]
-    if table.kinds[product] != "PRODUCT":
-        raise Unknown("a solid is no product's")
-    return table.label(product)
 
 
 def _colours(table: StepTable) -> Iterator[tuple[int, tuple[float, ...]]]:
