@@ -233,11 +233,7 @@ STEPS: tuple[Mutation, ...] = (
             *("step names", "a0001"),
         ),
         ("a face its complement", step(complement), CELLS),
-        (
-            "a face inside out",
-            step(lambda e, m: swap(e, face(e, m), ".T.", ".F.")),
-            "step outward",
-        ),
+        ("a face inside out", step(lambda e, m: swap(e, face(e, m), ".T.", ".F.")), "step outward"),
         ("a face not in the shell", step(dropped), CELLS, "inf"),
         (
             "the shell not closed",

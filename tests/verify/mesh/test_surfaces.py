@@ -7,12 +7,7 @@ import pytest
 from tbcad_verify.mesh.fits import fit_surfaces, patch_vertices
 from tbcad_verify.mesh.mesh import indexed_mesh
 from tbcad_verify.mesh.segments import Segmentation
-from tbcad_verify.mesh.surfaces import (
-    Surfaces,
-    nearest_to_origin,
-    prepare_for_rays,
-    reflect,
-)
+from tbcad_verify.mesh.surfaces import Surfaces, nearest_to_origin, prepare_for_rays, reflect
 from tbcad_verify.mesh.vectors import cross, dot, norm, tangent_basis, unit
 
 RNG = np.random.default_rng(5)

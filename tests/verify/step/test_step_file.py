@@ -16,13 +16,7 @@ from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.step import step_file
-from tbcad_verify.step.step_file import (
-    StepFile,
-    examine_all,
-    known,
-    load,
-    read_file,
-)
+from tbcad_verify.step.step_file import StepFile, examine_all, known, load, read_file
 
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
@@ -153,10 +147,7 @@ def test_broken_inside_is_unknown(tmp_path: Path, change: object) -> None:
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [
-        (lambda data: b"", "does not begin"),
-        (lambda data: data[: len(data) // 2], "does not end"),
-    ],
+    [(lambda data: b"", "does not begin"), (lambda data: data[: len(data) // 2], "does not end")],
 )
 def test_foreign_or_truncated_is_refused(tmp_path: Path, change: object, words: str) -> None:
     file = written(tmp_path, BOX)

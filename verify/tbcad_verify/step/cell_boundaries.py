@@ -24,12 +24,7 @@ from tbcad_verify.step.map_arcs import (
     joined_arcs,
     quadratic_roots,
 )
-from tbcad_verify.step.stereographic import (
-    MapCircles,
-    SurfaceMaps,
-    map_circles,
-    surface_maps,
-)
+from tbcad_verify.step.stereographic import MapCircles, SurfaceMaps, map_circles, surface_maps
 from tbcad_verify.types import Bools, Floats, Ints
 
 FIRST = 20  # circles that each mirror starts with

@@ -20,7 +20,7 @@ from tbcad_verify.types import Floats
 TEXT = r"'(?:[^']++|'')*+'"
 # An entity, or all that is left where none is.
 ENTITY = re.compile(
-    rf"#(\d{{1,15}}+) ?= ?([A-Z]\w*+)?\(((?:[^';]*+{TEXT})*+[^';]*)\);\n|((?s:.++))",
+    rf"#(\d{{1,15}}+) ?= ?([A-Z]\w*+)?\(((?:[^';]*+{TEXT})*+[^';]*)\);\n|((?s:.++))"
 )
 START = re.compile(r"\s*+ISO-10303-21;\s*+HEADER;")
 HEADER_END = re.compile(rf"{TEXT}|(?P<end>ENDSEC;\s*+DATA;\n)|(?P<open>')")
