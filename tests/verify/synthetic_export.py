@@ -11,7 +11,7 @@ import hashlib
 import io
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from itertools import combinations
 from pathlib import Path
@@ -50,7 +50,7 @@ COLUMNS = (
 
 @dataclass
 class Design:
-    """What to make. `moved` shifts centres and `grown` radii in the mesh only, by mirror number."""
+    """What to make; the mesh lacks mirrors with the numbers `without`."""
 
     n: int = 4
     radius: float = 55.0  # of the nearest mirrors, mm; it grows with the distance squared
@@ -64,8 +64,6 @@ class Design:
     arc: int = 12
     rings: int = 4
     strip: float = 3e-3
-    moved: dict[int, Any] = field(default_factory=dict)
-    grown: dict[int, float] = field(default_factory=dict)
     without: tuple[int, ...] = ()
 
 
@@ -173,11 +171,10 @@ class Cells:
             self._mesh(k)
 
     def _modelled(self, m):
-        shift = np.asarray(self.design.moved.get(m["number"], np.zeros(3)))
-        grown = self.design.grown.get(m["number"], 0.0) - self.design.coating
+        coat = self.design.coating
         if self.design.flat:
-            return m["p"] + shift - self.design.coating * m["n"], None, m["n"]
-        return m["c"] + shift, m["r"] + grown, m["n"]
+            return m["p"] - coat * m["n"], None, m["n"]
+        return m["c"], m["r"] - coat, m["n"]
 
     def planes(self, k):
         """Half spaces a.x >= b that bound cell k: neighbours by number, then seam -1, foot -2."""
@@ -289,31 +286,20 @@ class Cells:
         fractions = [self.design.strip, *(np.arange(1, self.design.rings) / self.design.rings)]
         before = loop
         for fraction in fractions:
-            ring = [self._new(self._toward(k, self.points[v], middle, fraction)) for v in loop]
-            self._band(k, before, ring)
+            steps = [self.points[v] + fraction * (middle - self.points[v]) for v in loop]
+            ring = [self._new(self._onto(k, x)) for x in steps]
+            for j, m in enumerate([*range(1, len(loop)), 0]):
+                self.faces += [(before[j], before[m], ring[m]), (before[j], ring[m], ring[j])]
             before = ring
         hub = self._new(middle)
-        for v, w in zip(before, [*before[1:], before[0]], strict=True):
-            self._face(k, v, w, hub)
+        self.faces += [(v, w, hub) for v, w in zip(before, [*before[1:], before[0]], strict=True)]
+        self.face_mirror += [k] * (len(self.faces) - len(self.face_mirror))
 
     def _onto(self, k, x):
         centre, radius, normal = self.spheres[k]
         if radius is None:
             return x - ((x - centre) @ normal) * normal
         return centre + radius * unit(x - centre)
-
-    def _toward(self, k, x, middle, fraction):
-        return self._onto(k, x + fraction * (middle - x))
-
-    def _band(self, k, outer, inner):
-        after = [*range(1, len(outer)), 0]
-        for j, m in enumerate(after):
-            self._face(k, outer[j], outer[m], inner[m])
-            self._face(k, outer[j], inner[m], inner[j])
-
-    def _face(self, k, *corners):
-        self.faces.append(corners)
-        self.face_mirror.append(k)
 
 
 def solid(cells: Cells, thickness: float = 1.1) -> np.ndarray:

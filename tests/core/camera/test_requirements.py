@@ -36,7 +36,8 @@ from tbcad.errors import InputError
 from tbcad.types import Floats
 from tests.mirror_arrays import mirror_array
 
-FAN = 1e-5  # distance of a fan's neighbouring ray from the apex, mm
+# Of a fan's neighbouring ray from the apex, mm.
+ALONG, ACROSS = np.array([1e-5, 0.0]), np.array([0.0, 1e-5])
 LENS = Lens(pixel=0.00345, image=3.65, wide_open=2.8, wavelength=550e-6)
 RANGE = DepthRange(150.0, 250.0)
 NEEDED = CameraRequirements(90.0, 70.0, 2000, 1400, 100.0, 150.0, 120.0, 0.8, 2.0, 2.0, 2.8)
@@ -74,9 +75,26 @@ def test_coddington_agrees_with_traced_fans(
     tangential, sagittal = image_distances(
         np.array(curvature), np.array(incidence), np.array(distance)
     )
-    across, along = np.array([0.0, FAN]), np.array([FAN, 0.0])
-    assert traced(curvature, incidence, distance, along) == pytest.approx(tangential, rel=1e-4)
-    assert traced(curvature, incidence, distance, across) == pytest.approx(sagittal, rel=1e-4)
+    assert traced(curvature, incidence, distance, ALONG) == pytest.approx(tangential, rel=1e-4)
+    assert traced(curvature, incidence, distance, ACROSS) == pytest.approx(sagittal, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "settings", [["n=5"], ["n=4", "camera_mm=[100, 20, -110]", "capture_diameter_mm=40"]], ids=str
+)
+def test_depths_are_those_of_fans_traced_at_every_mirror(settings: list[str]) -> None:
+    """Images of the ends of the capture sphere on each principal ray."""
+    array, radius, depth = mirror_array(*settings), 20.0, []
+    needed, mirrors, camera = camera_requirements(array, radius), array.mirrors, array.camera
+    for apex, normal, k in zip(mirrors.apex, mirrors.normal, mirrors.curvature, strict=True):
+        to_mirror, to_centre = np.linalg.norm(apex - camera.pinhole), np.linalg.norm(apex)
+        way = (apex - camera.pinhole) / to_mirror
+        incidence = float(np.arccos(-way @ normal))
+        for distance in (to_centre - radius, to_centre + radius):
+            for fan in (ALONG, ACROSS):
+                image = to_mirror + traced(float(k), incidence, float(distance), fan)
+                depth.append(float(image * (way @ camera.forward)))
+    assert (needed.near_mm, needed.far_mm) == pytest.approx((min(depth), max(depth)), rel=1e-4)
 
 
 def test_flat_mirrors_have_images_where_their_virtual_cameras_see_the_object() -> None:

@@ -26,6 +26,7 @@ from tests.verify.corpus.facets import (
     write_stl,
 )
 from tests.verify.corpus.mutation import Job, Mutation, failing, refusing
+from tests.verify.synthetic_export import mirrored
 
 # Takes a half's corners and its balls, those well inside first.
 Change = Callable[[Corners, list[Ball]], Corners]
@@ -190,8 +191,7 @@ def rotated(corners: Corners, _: list[Ball]) -> Corners:
     return (corners @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])).astype(np.float32)
 
 
-def mirrored(corners: Corners, _: list[Ball]) -> Corners:
-    return (corners * np.array([-1, 1, 1], np.float32))[:, ::-1]
+OWN_IMAGE = mesh(lambda corners, _: mirrored(corners))
 
 
 def exchanged(folder: Path) -> None:
@@ -267,7 +267,7 @@ MESHES: tuple[Mutation, ...] = (
             *("centre error", "0.020"),
         ),
         ("one half turned by 0.1 mrad", mesh(rotated), "centre error"),
-        ("one half its own mirror image", mesh(mirrored), "mirrors found", "missing"),
+        ("one half its own mirror image", OWN_IMAGE, "mirrors found", "missing"),
         ("the halves exchanged", exchanged, "mirrors found", "missing"),
         ("a loose piece in the light", loose(15, 3), "light paths"),
         ("a loose piece in the wall", loose(-1.5, 0.2), "components", "one piece"),

@@ -42,6 +42,11 @@ def whole(how: Callable[[Entities], object]) -> Job:
     return lambda folder: part21.edit(folder, NAME, how)
 
 
+def first(kind: str, old: str, new: str) -> Job:
+    """Change the first statement of a kind."""
+    return whole(lambda entities: swap(entities, all_of(entities, kind)[0], old, new))
+
+
 def raw(how: Callable[[bytes], bytes]) -> Job:
     return lambda folder: change(folder, NAME, how)
 
@@ -83,11 +88,6 @@ def inches(entities: Entities) -> None:
     )
 
 
-def vague(entities: Entities) -> None:
-    """An uncertainty of a millimetre: readers may join whatever is nearer."""
-    swap(entities, all_of(entities, "UNCERTAINTY_MEASURE_WITH_UNIT")[0], "1.E-06", "1.")
-
-
 def complement(entities: Entities, name: str) -> None:
     """Bounded the other way round: all of the sphere but the mirror, which kernels call valid."""
     swap(entities, down(entities, face(entities, name), 0), ".T.", ".F.")
@@ -119,10 +119,6 @@ def two_volumes(entities: Entities) -> None:
     shift(entities, wrong, 1000.0)
     shape = next(n for n, said in entities.items() if said.startswith("REPRESENTATION('volume'"))
     swap(entities, shape, f"(#{number})", f"(#{wrong},#{number})")
-
-
-def misnamed(entities: Entities) -> None:
-    swap(entities, all_of(entities, "MANIFOLD_SOLID_BREP")[0], "'shell_a'", "'shell_b'")
 
 
 def claim(words: str, by: float) -> Job:
@@ -205,6 +201,9 @@ def middle(old: bytes, new: bytes) -> Job:
     return raw(how)
 
 
+MISNAMED = first("MANIFOLD_SOLID_BREP", "'shell_a'", "'shell_b'")
+# An uncertainty of a millimetre: readers may join whatever is nearer.
+VAGUE = first("UNCERTAINTY_MEASURE_WITH_UNIT", "1.E-06", "1.")
 CELLS, CLAIMS = "step cells", "step properties"
 STEPS: tuple[Mutation, ...] = (
     *failing(
@@ -265,7 +264,7 @@ STEPS: tuple[Mutation, ...] = (
         ("another area claimed", claim("surface area measure", 1.0), CLAIMS, "area"),
         ("another centroid claimed", claim("centre point", 0.01), CLAIMS, "centroid"),
         ("a face and its bound turned", step(turned), "step outward"),
-        ("the solid misnamed", whole(misnamed), "step solid", "shell_b"),
+        ("the solid misnamed", MISNAMED, "step solid", "shell_b"),
     ),
     *refusing(
         "STEP",
@@ -286,7 +285,7 @@ STEPS: tuple[Mutation, ...] = (
         ("zeros in the middle", middle(b"CIRCLE", bytes(6)), "step solid"),
         ("two volumes claimed", whole(two_volumes), "step solid", "allowed is"),
         ("inches", whole(inches), "step solid", "LENGTH"),
-        ("true to a millimetre", whole(vague), "step solid", "LENGTH_MEASURE"),
+        ("true to a millimetre", VAGUE, "step solid", "LENGTH_MEASURE"),
         ("nothing claimed", whole(no_claims), "step solid", "geometricvalidationproperty"),
         ("the solid twice", whole(solid_twice), "step solid", "#AXIS2_PLACEMENT_3D"),
         unknown=True,

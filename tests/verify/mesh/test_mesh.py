@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from tbcad_verify.mesh.mesh import (
-    Topology,
-    examine_topology,
-    join_meshes,
-    mesh_from_facets,
-)
+from tbcad_verify.mesh.mesh import Topology, examine_topology, join_meshes, mesh_from_facets
 from tbcad_verify.mesh.stl import Facets, parse
 from tbcad_verify.record.files import FileBytes
 

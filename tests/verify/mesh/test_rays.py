@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from tbcad_verify.mesh.mesh import Mesh, indexed_mesh, join_meshes
 from tbcad_verify.mesh.rays import build_scene, first_hits, pixel_rows, row_chunks, with_image
-from tbcad_verify.record.export import read_export
+from tbcad_verify.record.export import Export
 from tbcad_verify.shell.measured_shell import flipped_mesh
 
-SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 
-
-def test_rays_go_through_the_middle_of_pixels_row_by_row() -> None:
-    camera = read_export(SAMPLE).cameras["a"]
+def test_rays_go_through_the_middle_of_pixels_row_by_row(sample: Export) -> None:
+    camera = sample.cameras["a"]
     first, last = 3, 5
     rays = pixel_rows(camera, first, last)
     assert rays.shape == (3, 2 * camera.width)
@@ -29,8 +25,8 @@ def test_rays_go_through_the_middle_of_pixels_row_by_row() -> None:
     )
 
 
-def test_chunks_are_all_rows_once() -> None:
-    camera = read_export(SAMPLE).cameras["b"]
+def test_chunks_are_all_rows_once(sample: Export) -> None:
+    camera = sample.cameras["b"]
     rows = [row for low, high in row_chunks(camera) for row in range(low, high)]
     assert rows == list(range(camera.height))
 

@@ -48,21 +48,13 @@ def test_the_first_file_explains_every_key() -> None:
 BAD = [
     ("wall_mm", "wal_mm", "unknown key wal_mm: did you mean wall_mm\\? allowed are name, process"),
     ("wall_mm = 1.8", "", "wall_mm is missing: change it"),
-    (
-        "wall_mm = 1.8",
-        "wall_mm = -1",
-        "wall_mm is -1: it should be greater than or equal",
-    ),
+    ("wall_mm = 1.8", "wall_mm = -1", "wall_mm is -1: it should be greater than or equal"),
     ("wall_mm = 1.8", "wall_mm = nan", "wall_mm is nan: it should be a finite number"),
     ("spot_mm = 0.6", "spot_mm = 0", "spot_mm is 0: it should be greater than 0:"),
     ('"FDM"', '"fdm"', "process is fdm: it should be 'FDM', 'SLA', 'SLS' or 'CNC'"),
     ("[200, 210.5, 250]", "[200, 210.5]", "bed_mm.2. is missing"),
     ("clearance_mm = 0.4", "clearance_mm = 100", "clearance_mm is 100, allowed is less than half"),
-    (
-        "overhang_deg = 50",
-        "overhang_deg = 91",
-        "overhang_deg is 91: it should be less than or",
-    ),
+    ("overhang_deg = 50", "overhang_deg = 91", "overhang_deg is 91: it should be less than or"),
     ('"mine"', '"a\\nb"', "name is 'a.*: String should match"),
     ("hole_mm = 2", "hole_mm = 2\nhole_mm = 3", "no TOML"),
     ("hole_mm = 2", "hole_mm = 2\ncavities = 1", "cavities is 1: it should be a valid boolean"),

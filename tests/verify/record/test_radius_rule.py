@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tbcad_verify.record.export import Export, read_export
-from tbcad_verify.step.shell_checks import rule_check
+from tbcad_verify.step.recorded_checks import rule_check
 
 from tbcad.core.mirrors.array import design
 from tbcad.core.mirrors.record import write_record

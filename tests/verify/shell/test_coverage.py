@@ -103,30 +103,10 @@ def test_a_flat_mirror_beside_the_object_does_not_surround_it() -> None:
 
 def dome(radius: float, angle: float, height: float, steps: int = 24) -> Mesh:
     """A spherical cap about the z axis, top at the height, bulging down, with a lid above."""
-    a = np.concatenate([np.linspace(0, angle, steps)[1:-1], [angle * (1 - 1e-4), angle]])
-    turn = 2 * np.pi * np.arange(240) / 240
-    rings = [
-        np.stack(
-            [
-                radius * np.sin(k) * np.cos(turn),
-                radius * np.sin(k) * np.sin(turn),
-                np.full(240, height + radius * (1 - np.cos(k))),
-            ],
-            axis=1,
-        )
-        for k in a
-    ]
-    points = np.vstack([[[0, 0, height]], *rings, [[0, 0, height + 30.0]]])
-    last = len(points) - 1
-    faces = []
-    for j in range(240):
-        m = (j + 1) % 240
-        faces.append([0, 1 + m, 1 + j])
-        for k in range(len(a) - 1):
-            p, q = 1 + 240 * k, 1 + 240 * (k + 1)
-            faces += [[p + j, p + m, q + m], [p + j, q + m, q + j]]
-        faces.append([q + j, q + m, last])
-    return indexed_mesh(points, np.array(faces, dtype=np.int32))
+    a = np.concatenate([np.linspace(0, angle, steps)[:-1], [angle * (1 - 1e-4), angle]])
+    outline = np.column_stack([radius * np.sin(a), height + radius * (1 - np.cos(a))])
+    whole = trimesh.creation.revolve(np.vstack([outline, [0, height + 30]]), sections=240)
+    return indexed_mesh(np.array(whole.vertices), whole.faces.astype(np.int32))
 
 
 @pytest.mark.parametrize(

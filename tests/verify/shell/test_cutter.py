@@ -11,10 +11,8 @@ from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.shell.cutter import CutterReach, measure_reach
 from trimesh.triangles import closest_point
 
-RADIUS, ASIDE = (
-    20.0,
-    4.5,
-)  # of two spheres, and of their centres from x = 0, mm: slopes of 13 degrees
+# Of two spheres, and of their centres from x = 0, mm: slopes of 13 degrees.
+RADIUS, ASIDE = 20.0, 4.5
 HALF = 2.0  # width and length of what is meshed, mm
 
 

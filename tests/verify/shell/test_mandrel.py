@@ -21,7 +21,7 @@ from tbcad_verify.run.stages import stage_titles
 from tbcad_verify.run.verify import verify
 from tbcad_verify.shell.mandrel import mandrel_results
 from tbcad_verify.shell.optics import OpticalSetup
-from tbcad_verify.step.mandrel_checks import mandrel_comparisons, mandrel_step_checks
+from tbcad_verify.step.shell_checks import compare_all, front_step_checks
 from tbcad_verify.step.step_file import read_step_files
 
 from tbcad.cad.formats.mesh_files import write_stl
@@ -94,9 +94,8 @@ def step_failing(folder: Path) -> dict[str, str]:
     record = replace(record, parts=(), mandrels=record.mandrels[:1])  # no other file is read
     with Processes(1, 120) as processes:
         files = read_step_files(record, processes)
-    checks = mandrel_step_checks(record, {}, mandrel_comparisons(record, files))
-    mine = [check for check in checks if check.file == STEP and check.passed is False]
-    return {check.name: check.detail for check in mine}
+    checks = front_step_checks(record, record.mandrels, {}, compare_all(record, files))
+    return {check.name: check.detail for check in checks if check.passed is False}
 
 
 @ON_VALLEYS

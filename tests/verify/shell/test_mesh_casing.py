@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tbcad_verify.mesh.holes import RoundHoles, round_holes
-from tbcad_verify.mesh.mesh import Mesh, indexed_mesh, mesh_from_facets
+from tbcad_verify.mesh.mesh import Mesh, indexed_mesh
 from tbcad_verify.mesh.segments import measure_edges
 from tbcad_verify.mesh.spheroids import growth
-from tbcad_verify.mesh.stl import read_facets
 from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.record.export import Export
 from tbcad_verify.shell.mesh_casing import (
@@ -20,18 +19,19 @@ from tbcad_verify.shell.mesh_casing import (
     find_valleys,
     measure_casing,
 )
-from tbcad_verify.shell.optics import OpticalSetup, pinhole_of, set_up
-from tbcad_verify.shell.recover import recover
+from tbcad_verify.shell.optics import OpticalSetup
+
+from tests.verify.optical_setups import meshes_of, setup_of_meshes
 
 
 @pytest.fixture(scope="module")
 def meshes(sample: Export) -> list[Mesh]:
-    return [mesh_from_facets(read_facets(sample.folder, part.stl)[0]) for part in sample.parts]
+    return meshes_of(sample)
 
 
 @pytest.fixture(scope="module")
 def setup(sample: Export, meshes: list[Mesh]) -> OpticalSetup:
-    return of_meshes(sample, meshes)
+    return setup_of_meshes(sample, meshes)
 
 
 @pytest.fixture(scope="module")
@@ -40,12 +40,6 @@ def holes(sample: Export, meshes: list[Mesh]) -> dict[str, RoundHoles]:
         part.name: round_holes(mesh, measure_edges(mesh))
         for part, mesh in zip(sample.parts, meshes, strict=True)
     }
-
-
-def of_meshes(export: Export, meshes: list[Mesh]) -> OpticalSetup:
-    radius, pairs = export.target_mm / 2, list(zip(meshes, export.parts, strict=True))
-    found = [recover(mesh, pinhole_of(export, part), radius) for mesh, part in pairs]
-    return set_up(export, meshes, found)
 
 
 def test_the_sample_is_as_designed(setup: OpticalSetup, holes: dict[str, RoundHoles]) -> None:
@@ -91,7 +85,7 @@ def test_a_dent_behind_a_valley_is_found_in_its_half_alone(
     middle = camera / 2 + (sample.semi_minor_mm + measure_casing(setup, 0).beyond) * normal
     dent = np.linalg.norm(points - middle, axis=1) < 15
     points[dent & ((points - camera / 2) @ normal > sample.semi_minor_mm)] -= 0.1 * normal
-    dented = of_meshes(sample, [indexed_mesh(points, meshes[0].faces), meshes[1]])
+    dented = setup_of_meshes(sample, [indexed_mesh(points, meshes[0].faces), meshes[1]])
     found = casing_checks(dented, holes)
     assert [one.passed for one in found] == [False, True, True, True]
     assert found[0].measured == pytest.approx(0.1, rel=0.05)

@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
-from OCP.gp import gp_Pnt
 from tbcad_verify.mesh.stl import read_facets
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.report.checks import Check
-from tbcad_verify.run.processes import Processes
 from tbcad_verify.shell.integrity import mesh_ends_checks
 from tbcad_verify.shell.measured_shell import measure_shells
-from tbcad_verify.step.kernel.reading import transferred
-from tbcad_verify.step.shell_checks import shell_comparisons, shell_step_checks
-from tbcad_verify.step.step_file import read_step_files
 
-from tbcad.cad.formats.step import write_step
-from tbcad.cad.kernel.brep import Solid
-from tbcad.cad.kernel.solids import one_solid
 from tests.verify.synthetic_export import FOOT, facets_of, mirrored, stl
 
-SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 X, Z = 0, 2
 STEP_OF_FLOAT32 = 1.6e-5  # mm, of coordinates between 128 and 256
 
@@ -92,53 +79,3 @@ def test_parts_that_are_no_halves_may_be_anywhere(export_folder: Path) -> None:
     assert mesh_ends_checks(record, stand, None, "not measured") == []
     (check,) = mesh_ends_checks(record, record.parts[0], None, "not measured")
     assert (check.passed, check.detail) == (None, "not measured")
-
-
-def step_ends(folder: Path) -> Check:
-    """The check of the first half's STEP file."""
-    record = read_export(folder)
-    record = replace(record, parts=record.parts[:1])
-    with Processes(1, 120) as processes:
-        comparisons = shell_comparisons(record, read_step_files(record, processes))
-    checks = shell_step_checks(record, {}, comparisons, None, ())
-    return next(check for check in checks if check.name == "step seam and foot")
-
-
-def with_a_tip(folder: Path, axis: int, way: float) -> None:
-    """A cube of 1 mm that ends so far beyond a plane, joined to the first half by the kernel."""
-    shell, foot = transferred(folder / "shell_a.step"), read_export(folder).foot_z_mm
-    low = shell_corner(folder, foot)
-    low[axis] = (foot if axis == Z else 0.0) - way
-    cube = BRepPrimAPI_MakeBox(gp_Pnt(*low.tolist()), 1.0, 1.0, 1.0).Shape()
-    whole = one_solid("shell_a", BRepAlgoAPI_Fuse(shell, cube).Shape())
-    (folder / "shell_a.step").unlink()
-    write_step(folder / "shell_a.step", Solid("shell_a", whole, ()))
-
-
-def shell_corner(folder: Path, foot: float) -> np.ndarray:
-    """A place in the half's wall, at both planes: behind the mirrors, before the back."""
-    corners = facets_of(folder / "shell_a.stl").reshape(-1, 3).astype(float)
-    both = corners[(corners[:, X] == 0) & (np.abs(corners[:, Z] - foot) < 1e-5)]
-    right = both[both[:, 1] > 0]
-    return np.array([0.0, right[:, 1].mean(), foot])
-
-
-@pytest.mark.parametrize(
-    ("axis", "way", "said"),
-    [
-        (Z, 0.16, "0.16 mm beyond the foot"),
-        (X, 0.05, "0.05 mm beyond the seam"),
-        (Z, 1e-5, "1e-05 mm beyond the foot"),
-    ],
-)
-def test_a_tip_in_the_step_file_is_told(tmp_path: Path, axis: int, way: float, said: str) -> None:
-    folder = Path(shutil.copytree(SAMPLE, tmp_path / "copy"))
-    good = step_ends(folder)
-    assert good.passed
-    assert good.measured is not None
-    assert good.measured < 1e-9
-    with_a_tip(folder, axis, way)
-    bad = step_ends(folder)
-    assert bad.passed is False
-    assert bad.measured == pytest.approx(way, rel=1e-3)
-    assert said in bad.detail

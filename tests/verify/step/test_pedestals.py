@@ -12,11 +12,11 @@ import pytest
 from tbcad_verify.record.export import read_export
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.verify import verify
-from tbcad_verify.step.front_checks import SURFACE_MM
+from tbcad_verify.step.front_checks import SURFACE_MM, FrontComparison, compare
 from tbcad_verify.step.pedestals import wall_errors
-from tbcad_verify.step.shell_checks import ShellComparison, area_checks, shell_comparisons
+from tbcad_verify.step.recorded_checks import area_checks
 from tbcad_verify.step.sphere_union import bounds
-from tbcad_verify.step.step_file import known, read_step_files
+from tbcad_verify.step.step_file import read_step_files
 from tbcad_verify.types import Floats
 
 from tbcad.output.build import write_export
@@ -31,11 +31,12 @@ SETTINGS = [
 ]
 
 
-def compared(folder: Path, camera: str = "a") -> ShellComparison:
+def compared(folder: Path, camera: str = "a") -> FrontComparison:
     export = read_export(folder)
+    (part,) = (part for part in export.parts if part.camera == camera)
     with Processes(1) as processes:
-        files = read_step_files(export, processes)
-    return known(shell_comparisons(export, files)[f"shell_{camera}"])
+        (file,) = read_step_files(replace(export, parts=(part,)), processes).values()
+    return compare(export, part, file)
 
 
 @pytest.fixture(scope="module")
@@ -46,11 +47,11 @@ def shells(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def shell(shells: Path) -> ShellComparison:
+def shell(shells: Path) -> FrontComparison:
     return compared(shells)
 
 
-def errors(shell: ShellComparison, widths: float = 1.0, **changes: Any) -> Floats:
+def errors(shell: FrontComparison, widths: float = 1.0, **changes: Any) -> Floats:
     """Of the walls, with changes to what was read, and another width of grooves."""
     assert shell.grooves
     grooves, camera = replace(shell.grooves, **changes), shell.camera
@@ -77,7 +78,7 @@ def test_grooves_of_other_designs(settings: list[str], tmp_path: Path) -> None:
     assert areas.passed, areas
 
 
-def test_a_wall_off_its_place_is_found(shell: ShellComparison) -> None:
+def test_a_wall_off_its_place_is_found(shell: FrontComparison) -> None:
     """Planes, bottoms and the spec's width: each changes the errors by as much as it is off."""
     assert shell.grooves
     assert errors(shell).max() < SURFACE_MM
@@ -92,7 +93,7 @@ def test_a_wall_off_its_place_is_found(shell: ShellComparison) -> None:
     assert 0 < np.isinf(errors(shell, bottom=loose)).sum() < len(one)
 
 
-def test_areas_hold_where_walls_are(shell: ShellComparison) -> None:
+def test_areas_hold_where_walls_are(shell: FrontComparison) -> None:
     """The record's areas are those between the walls of the files, both."""
     other = compared(shell.export.folder, "b")
     assert shell.grooves

@@ -7,14 +7,7 @@ import pytest
 from tbcad_verify.record.export import Export
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.step.part21 import StepTable
-from tbcad_verify.step.solids_text import (
-    Casing,
-    RoundFace,
-    holes,
-    read_casing,
-    read_solids,
-    wall,
-)
+from tbcad_verify.step.solids_text import Casing, RoundFace, holes, read_casing, read_solids, wall
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from tbcad_verify.mesh.mesh import Mesh, connected_groups
 from tbcad_verify.mesh.segments import BLIND_RAD, CONCAVE_RAD, Edges, half_edge_vectors
 from tbcad_verify.mesh.vectors import dot, norm, tangent_basis, unit
 from tbcad_verify.record.flange_holes import Hole
-from tbcad_verify.types import Bools, Floats, Ints
+from tbcad_verify.types import Floats, Ints
 
 Groups = NDArray[np.int32]
 
@@ -60,9 +60,11 @@ class FacetPatches:
 
 def round_holes(mesh: Mesh, edges: Edges) -> RoundHoles:
     """Find every round hole of which three quarters of the full turn are there."""
-    bent = _bent(edges)
+    clear, least = edges.noise < BLIND_RAD, CONCAVE_RAD + edges.noise
+    bent = clear & (-edges.angle > least) & (-edges.angle < BEND_RAD)
+    flat = clear & (np.abs(edges.angle) <= least)
     half, bend = edges.half[bent], -edges.angle[bent]
-    links = np.concatenate([half, edges.half[_flat(edges)]])
+    links = np.concatenate([half, edges.half[flat]])
     links = np.stack([links // 3, mesh.twin[links] // 3])
     hollow = _bending(_joined(len(mesh.faces), links, np.arange(len(mesh.faces))), half // 3)
     label = np.full(len(mesh.faces), -1, dtype=np.int32)
@@ -70,17 +72,6 @@ def round_holes(mesh: Mesh, edges: Edges) -> RoundHoles:
     axis = _axes(mesh, half, bend, label, hollow.count)
     upright = np.abs(dot(_normals(mesh, hollow), axis[:, hollow.group])) < UPRIGHT_COS
     return _round(mesh, _joined(len(mesh.faces), links, hollow.facet[upright]))
-
-
-def _bent(edges: Edges) -> Bools:
-    bend = -edges.angle
-    clear = (bend > CONCAVE_RAD + edges.noise) & (edges.noise < BLIND_RAD)
-    return np.asarray(clear & (bend < BEND_RAD))
-
-
-def _flat(edges: Edges) -> Bools:
-    flat = np.abs(edges.angle) <= CONCAVE_RAD + edges.noise
-    return np.asarray(flat & (edges.noise < BLIND_RAD))
 
 
 def _joined(size: int, links: Ints, facet: Ints) -> FacetPatches:
@@ -146,7 +137,10 @@ def _round(mesh: Mesh, patches: FacetPatches) -> RoundHoles:
     uneven = group[~(off < ROUND * radius[group])]
     good = np.bincount(uneven, minlength=patches.count) == 0
     good &= widest_gaps(np.arctan2(spoke[1], spoke[0]), group, patches.count) < GAP_RAD
-    low, high = _extent(dot(axis[:, group], corner), group, patches.count)
+    along, (low, high) = dot(axis[:, group], corner), np.full((2, patches.count), np.inf)
+    np.minimum.at(low, group, along)
+    np.minimum.at(high, group, -along)
+    high = -high
     middle = centre[0] * sides[0] + centre[1] * sides[1] + (low + high) / 2 * axis
     return RoundHoles(
         2 * radius[good],
@@ -155,13 +149,6 @@ def _round(mesh: Mesh, patches: FacetPatches) -> RoundHoles:
         (high - low)[good],
         patches.facet[good[patches.group]],
     )
-
-
-def _extent(along: Floats, group: Groups, count: int) -> tuple[Floats, Floats]:
-    low, high = np.full(count, np.inf), np.full(count, -np.inf)
-    np.minimum.at(low, group, along)
-    np.maximum.at(high, group, along)
-    return low, high
 
 
 def fit_circles(points: Floats, group: Groups, count: int) -> tuple[Floats, Floats]:

@@ -135,9 +135,7 @@ def row_chunks(camera: Camera) -> list[tuple[int, int]]:
 
 
 def in_threads(
-    work: Callable[[Item], Result],
-    items: Iterable[Item],
-    stop: Callable[[], None] = lambda: None,
+    work: Callable[[Item], Result], items: Iterable[Item], stop: Callable[[], None] = lambda: None
 ) -> list[Result]:
     """Results in the items' order, whatever the threads do.
 

@@ -29,8 +29,8 @@ class Surfaces:
         """The surfaces with these numbers, in this order."""
         return take(self, index)
 
-    def coated(self, thickness: float) -> Surfaces:
-        """The surfaces at this distance above, mm."""
+    def coated(self, thickness: float | Floats) -> Surfaces:
+        """The surfaces at this distance above, mm; (N,) or one for all."""
         return Surfaces(
             self.point + thickness * self.normal,
             self.normal,
@@ -123,8 +123,3 @@ def distance_before_mirror(surfaces: PreparedSurfaces, d: Floats, reach: Floats)
     `reach`: (N,) how many lengths of d lie before the mirror.
     """
     return norm(nearest_on_lines(surfaces.origin[:, None], d, last=reach))
-
-
-def miss_distances(lines: ReflectedRays) -> Floats:
-    """(N,) distances of the reflected lines from the origin, mm."""
-    return norm(nearest_to_origin(lines))

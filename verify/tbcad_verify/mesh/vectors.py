@@ -79,10 +79,7 @@ def tangent_basis(n: Floats) -> tuple[Floats, Floats]:
 
 
 def nearest_on_lines(
-    point: Floats,
-    direction: Floats,
-    first: float | Floats = -np.inf,
-    last: float | Floats = np.inf,
+    point: Floats, direction: Floats, first: float | Floats = -np.inf, last: float | Floats = np.inf
 ) -> Floats:
     """(3, N) the points of lines point + t direction that are nearest to the origin.
 

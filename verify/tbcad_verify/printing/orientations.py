@@ -22,11 +22,14 @@ AXES = np.vstack([-np.eye(3)[::-1], np.eye(3)[::-1]]).T  # -z first: as the file
 
 @dataclass(frozen=True)
 class HullView:
-    """A hull with one of its directions down, whatever the machine."""
+    """A hull with one of its directions down, seen from above, whatever the machine."""
 
     level: Floats  # (3, 3) rotation from the file's axes to some with z up
-    seen: Silhouette  # from above
     height: float  # mm
+    rim: Floats  # (2, N) corners of its outline, mm
+    # (K,) rotations that bring an edge of the rim to lie along x or y, rad, ascending
+    turns: Floats
+    sides: Floats  # (2, K) extents along x and y after each, mm
 
 
 @dataclass(frozen=True)
@@ -40,18 +43,23 @@ class PartHull:
     @cached_property
     def standing(self) -> list[HullView]:
         """The hull seen along each of `down`."""
-        return [_view(self.points, down) for down in self.down.T]
+        return [hull_view(self.points, down) for down in self.down.T]
 
     @cached_property
     def leaning(self) -> list[HullView]:
         """The hull seen along each of `tilted`."""
-        return [_view(self.points, down) for down in self.tilted.T]
+        return [hull_view(self.points, down) for down in self.tilted.T]
 
 
-def _view(points: Floats, down: Floats) -> HullView:
+def hull_view(points: Floats, down: Floats) -> HullView:
+    """The view of points (3, N), mm, against a unit direction (3,)."""
     level = np.stack([*(side[:, 0] for side in tangent_basis(-down[:, None])), -down])
     turned = np.einsum("ij,jn->in", level, points)
-    return HullView(level, silhouette(turned[:2]), float(np.ptp(turned[2])))
+    rim = turned[:2, ConvexHull(turned[:2].T).vertices]
+    edge = np.roll(rim, -1, axis=1) - rim
+    across = np.mod(-np.arctan2(edge[1], edge[0]), np.pi / 2)
+    turns = _canonical(np.concatenate([across, across + np.pi / 2]))
+    return HullView(level, float(np.ptp(turned[2])), rim, turns, _sides(rim, turns))
 
 
 def part_hull(points: Floats) -> PartHull:
@@ -96,26 +104,7 @@ def _tilted(down: Floats) -> Floats:
     return np.asarray(tilted / norm(tilted))
 
 
-@dataclass(frozen=True)
-class Silhouette:
-    """A part seen from above."""
-
-    rim: Floats  # (2, N) corners of the convex hull, mm
-    # (K,) rotations that bring an edge of the rim to lie along x or y, rad, ascending
-    turns: Floats
-    sides: Floats  # (2, K) extents along x and y after each, mm
-
-
-def silhouette(points: Floats) -> Silhouette:
-    """The silhouette of points (2, N), mm."""
-    rim = points[:, ConvexHull(points.T).vertices]
-    turns = _edges(rim)
-    return Silhouette(rim, turns, _sides(rim, turns))
-
-
-def best_rotation(
-    seen: Silhouette, width: float, depth: float, slack: float
-) -> tuple[float, Floats]:
+def best_rotation(seen: HullView, width: float, depth: float, slack: float) -> tuple[float, Floats]:
     """The best rotation, and the sides of the box after it.
 
     The smallest of the enclosing rectangles that fit; if none of those with a side along an edge
@@ -141,13 +130,6 @@ def best_rotation(
     excess = np.maximum(sides[0] - width, sides[1] - depth)
     k = int(np.argmax(excess <= excess.min() + 1e-9 * np.abs(sides).max()))
     return float(angles[k]), sides[:, k]
-
-
-def _edges(rim: Floats) -> Floats:
-    """Rotations that bring an edge of the rim to lie along x or y, ascending."""
-    edge = np.roll(rim, -1, axis=1) - rim
-    across = np.mod(-np.arctan2(edge[1], edge[0]), np.pi / 2)
-    return _canonical(np.concatenate([across, across + np.pi / 2]))
 
 
 def _canonical(turns: Floats) -> Floats:

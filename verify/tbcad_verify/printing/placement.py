@@ -92,7 +92,7 @@ def pose_text(pose: Pose) -> str:
 def _pose(view: HullView, profile: Profile) -> Pose:
     width, depth, height = profile.bed_mm
     rim = 2 * profile.clearance_mm
-    angle, sides = best_rotation(view.seen, width - rim, depth - rim, SLACK_MM)
+    angle, sides = best_rotation(view, width - rim, depth - rim, SLACK_MM)
     size = np.append(sides, view.height)
     excess = float((size - np.array([width - rim, depth - rim, height])).max())
     cos, sin = math.cos(angle), math.sin(angle)

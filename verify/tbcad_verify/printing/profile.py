@@ -7,9 +7,10 @@ import stat
 import tomllib
 from difflib import get_close_matches
 from importlib import resources
+from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.validation import fault, shown
@@ -24,12 +25,8 @@ class BadProfile(BadExport):
     """A profile that cannot be used; one line: where, what, what is allowed, what to do."""
 
 
-def _as_tuple(value: object) -> object:
-    return tuple(value) if isinstance(value, list) else value
-
-
 _Side = Annotated[float, Field(gt=0, le=100_000)]
-_Sides = Annotated[tuple[_Side, _Side, _Side], BeforeValidator(_as_tuple)]
+_Sides = Annotated[tuple[_Side, _Side, _Side], Field(strict=False)]  # a list in TOML
 
 
 class Profile(BaseModel):
@@ -110,17 +107,14 @@ def parse(where: str, text: str) -> Profile:
 def _read(path: str) -> str:
     where = _shown_path(path)
     try:
-        # Not blocking: a pipe that nobody writes to is refused, not waited for.
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+        info = os.stat(path)
+        small = stat.S_ISREG(info.st_mode) and info.st_size <= MAX_BYTES
+        data = Path(path).read_bytes() if small else b""
     except (OSError, ValueError) as error:
         raise BadProfile(_no_such(path)) from error
-    try:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise BadProfile(f"profile {where}: not a regular file; give a .toml file")
-        data = os.read(handle, MAX_BYTES + 1)
-    finally:
-        os.close(handle)
-    if len(data) > MAX_BYTES:
+    if not stat.S_ISREG(info.st_mode):
+        raise BadProfile(f"profile {where}: not a regular file; give a .toml file")
+    if not small:
         raise BadProfile(f"profile {where}: larger than the {MAX_BYTES} bytes allowed")
     try:
         return data.decode("utf-8-sig")

@@ -30,7 +30,8 @@ from tbcad_verify.report.checks import (
     require,
     short_list,
 )
-from tbcad_verify.step import part_checks
+from tbcad_verify.step.part_checks import CHECKS as PART_CHECKS
+from tbcad_verify.step.part_checks import PartComparison, file_checks
 from tbcad_verify.step.solids_text import TextSolid, holes, read_solids
 from tbcad_verify.step.step_file import StepFile, known
 from tbcad_verify.types import Floats, Ints
@@ -236,20 +237,15 @@ def part_step_checks(
 ) -> list[Check]:
     """All checks of the STEP files of printed parts, against figures of the placed meshes."""
 
-    def compared(part: PrintedPart) -> list[Check]:
+    def compared(part: PrintedPart) -> PartComparison:
         file, mass = known(files[part.name]), masses.get(part.name)
-        comparison = part_checks.PartComparison(
-            part.name, file, mass, export.mesh_error_mm, CLAIM_SHARE
-        )
-        return part_checks.run_checks(part_checks.CHECKS, part.step, comparison)
+        return PartComparison(part.name, file, mass, export.mesh_error_mm, CLAIM_SHARE)
 
     checked = [
         check
         for part in export.printed
         if part.step
-        for check in guarded(
-            part_checks.names_of(part_checks.CHECKS, part.step), partial(compared, part)
-        )
+        for check in file_checks(PART_CHECKS, part.step, partial(compared, part))
     ]
     return checked + guarded([COUPONS], lambda: [_coupon_check(export, files)])
 

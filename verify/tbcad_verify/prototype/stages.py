@@ -35,7 +35,7 @@ from tbcad_verify.record.prototype import Prototype
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require
 from tbcad_verify.report.methods import prototype_stages
 from tbcad_verify.run.results import Results, ResultSink
-from tbcad_verify.step.shell_checks import RULE, rule_check
+from tbcad_verify.step.recorded_checks import RULE, rule_check
 from tbcad_verify.step.solids_text import TextSolid
 
 RECORD, PARTS, PRINTING = "prototype's record", "printed parts", "printability of the prototype"

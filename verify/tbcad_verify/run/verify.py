@@ -26,17 +26,9 @@ from tbcad_verify.report.text import strictly
 from tbcad_verify.run.processes import ProcessEnded, Processes
 from tbcad_verify.run.results import PER_MIRROR, CollectedResults, Results
 from tbcad_verify.run.stages import run_in_two, run_stages, stage_titles
-from tbcad_verify.step.mandrel_checks import (
-    MandrelComparison,
-    mandrel_comparisons,
-    mandrel_step_checks,
-)
-from tbcad_verify.step.shell_checks import (
-    ShellComparison,
-    area_checks,
-    shell_comparisons,
-    shell_step_checks,
-)
+from tbcad_verify.step.front_checks import FrontComparison
+from tbcad_verify.step.recorded_checks import area_checks, radius_checks
+from tbcad_verify.step.shell_checks import Comparisons, compare_all, front_step_checks
 from tbcad_verify.step.step_file import PROCESSES, StepFile, read_step_files
 from tbcad_verify.types import Progress
 
@@ -45,9 +37,7 @@ LARGEST_CUTTER_MM = 100.0
 FLOAT32_SHARE = 1e-3  # of a volume: the error of programs that sum in float32
 Stamps = dict[str, tuple[int, ...]]
 Files = dict[str, StepFile | Unknown]
-Comparisons = dict[str, ShellComparison | Unknown]
-Mandrels = dict[str, MandrelComparison | Unknown]
-Steps = tuple[Files, Comparisons, Mandrels, list[Check]]
+Steps = tuple[Files, Comparisons, list[Check]]
 
 
 @dataclass(frozen=True)
@@ -159,27 +149,27 @@ def _steps(export: Export, seconds: float) -> Iterator[Callable[[], Steps]]:
 
 def _read_steps(export: Export, processes: Processes) -> Steps:
     files = read_step_files(export, processes)
-    shells = shell_comparisons(export, files)
-    found = {one.camera.id: one.grooves for one in shells.values() if not isinstance(one, Unknown)}
-    areas = area_checks(export, found) if shells else []
-    return files, shells, mandrel_comparisons(export, files), areas
+    fronts, shells = compare_all(export, files), [part for part in export.parts if part.step]
+    found = {part.camera: fronts[part.name] for part in shells}
+    grooves = {key: one.grooves for key, one in found.items() if isinstance(one, FrontComparison)}
+    return files, fronts, area_checks(export, grooves) if shells else []
 
 
 def _compare_steps(export: Export, results: CollectedResults, steps: Callable[[], Steps]) -> None:
+    wait, masses = cache(steps), results.masses
     if any(part.step for part in export.parts):
         results.add(Results(stages=["STEP"]))
-        _, comparisons, _, areas = steps()
-        coverage = results.mirrors.get("coverage_fitted_mm")
-        checks = shell_step_checks(export, results.masses, comparisons, coverage, areas)
-        results.add(Results(checks=checks))
+        _, fronts, areas = wait()
+        recorded = areas + radius_checks(export, results.mirrors.get("coverage_fitted_mm"))
+        solids = front_step_checks(export, export.parts, masses, fronts)
+        results.add(Results(checks=recorded + solids))
     if any(part.step for part in export.mandrels):
         results.add(Results(stages=["STEP of the mandrels"]))
-        _, _, mandrels, _ = steps()
-        results.add(Results(checks=mandrel_step_checks(export, results.masses, mandrels)))
+        solids = front_step_checks(export, export.mandrels, masses, wait()[1])
+        results.add(Results(checks=solids))
     if any(part.step for part in export.printed):
         results.add(Results(stages=["STEP of the prototype"]))
-        files, _, _, _ = steps()
-        results.add(Results(checks=part_step_checks(export, results.masses, files)))
+        results.add(Results(checks=part_step_checks(export, masses, wait()[0])))
 
 
 def _refuse_changes(export: Export, before: Stamps) -> None:

@@ -7,6 +7,7 @@ elsewhere neither does.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -170,16 +171,15 @@ def _hidden(
     facets = np.flatnonzero((owner[:-1] >= 0) & setup.mine(camera)[owner[:-1]])
     origin = camera.pinhole[:, None]
 
-    def edges(part: slice) -> NDArray[np.int32]:
-        return first_hits(setup.scene, origin, outline.inside[:, part] - origin)
+    def hits(count: int, points: Callable[[slice], Floats]) -> list[NDArray[np.int32]]:
+        return in_threads(
+            lambda part: first_hits(setup.scene, origin, points(part) - origin),
+            chunks(count, RAYS_A_CHUNK),
+        )
 
-    def insides(part: slice) -> NDArray[np.int32]:
-        return first_hits(setup.scene, origin, facet_centres(setup.mesh, facets[part]) - origin)
-
-    jobs = [(edges, part) for part in chunks(outline.mirror.size, RAYS_A_CHUNK)]
-    jobs += [(insides, part) for part in chunks(facets.size, RAYS_A_CHUNK)]
-    hits = in_threads(lambda job: job[0](job[1]), jobs)
-    facet = np.concatenate([np.zeros(0, dtype=np.int32), *hits])
+    edges = hits(outline.mirror.size, lambda part: outline.inside[:, part])
+    insides = hits(facets.size, lambda part: facet_centres(setup.mesh, facets[part]))
+    facet = np.concatenate([np.zeros(0, dtype=np.int32), *edges, *insides])
     mirror = np.concatenate([outline.mirror, owner[facets]])
     wrong = np.flatnonzero(owner[facet] != mirror)
     return mirror[wrong], facet[wrong]

@@ -45,11 +45,7 @@ KINDS = {"stl": ".stl", "step": ".step", "threemf": ".3mf"}  # files that every 
 OWN_FILES = frozenset({"manifest.json", NAME, "report.html"})
 # What a person reads, and no machine: its owner may edit it. Drawings keep their paper's size.
 PAPER_FILES = ("bom.csv", "wiring.csv", "camera.json", "*.pdf")
-MANIFEST = (
-    ("manifest", "manifest.json", "wrong files"),
-    PAPER,
-    ("other files", "", "files"),
-)
+MANIFEST = (("manifest", "manifest.json", "wrong files"), PAPER, ("other files", "", "files"))
 TOPOLOGY = {
     "watertight": "bad edges",
     "facets": "bad facets",

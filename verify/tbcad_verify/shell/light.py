@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad_verify.mesh.rays import (
-    RayScene,
     distances_to_planes,
     first_hits,
     in_threads,
@@ -17,7 +16,6 @@ from tbcad_verify.mesh.rays import (
     row_chunks,
 )
 from tbcad_verify.mesh.surfaces import (
-    PreparedSurfaces,
     ReflectedRays,
     distance_before_mirror,
     nearest_to_origin,
@@ -25,31 +23,12 @@ from tbcad_verify.mesh.surfaces import (
     reflect_directions,
 )
 from tbcad_verify.mesh.vectors import crossings, dot, norm
-from tbcad_verify.record.export import Camera
+from tbcad_verify.shell.optics import SensorScene
 from tbcad_verify.types import Floats, Ints
 
 # Second rays start this far above the mirror, mm: a hundred times what float32 rounds.
 LIFT_MM = 1e-3
 SAMPLED = 7  # a prime: no column of pixels is left out
-
-
-@dataclass(frozen=True)
-class SensorScene:
-    """What light meets, for one camera."""
-
-    scene: RayScene  # all parts
-    # as much of it as tells which of this camera's mirrors rays from the pinhole meet first
-    own: RayScene
-    camera: Camera  # the real camera
-    # (F + 1,) mirror of each facet that belongs to this camera's mirrors, else -1; the last entry
-    # stands for a ray that hits nothing
-    owner: NDArray[np.int32]
-    other: NDArray[np.bool_]  # (F + 1,) true for facets of any mirror
-    # the mirrors' reflecting surfaces from the pinhole, one a recorded mirror
-    seen: PreparedSurfaces
-    mirrors: int  # M, how many are recorded
-    radius_mm: float  # of the capture sphere
-    coating_mm: float  # the coat that the mesh does not show
 
 
 @dataclass(frozen=True)
@@ -95,17 +74,17 @@ def trace_rows(sensor: SensorScene, first: int, last: int) -> PixelTally:
     lines = reflect(sensor.seen, mirror, d)
     miss = nearest_to_origin(lines)
     distance = norm(miss)
-    useful = distance <= sensor.radius_mm
+    useful = distance <= sensor.setup.radius
     second, stopped = _second(sensor, lines, miss, distance, useful)
     clear = np.flatnonzero(useful & ~stopped)
     on_object = mirror[clear]
     distance = distance_before_mirror(sensor.seen, np.take(d, clear, axis=1), lines.reach[clear])
-    nearest = np.full(sensor.mirrors, np.inf)
+    nearest = np.full(len(sensor.setup.export.mirrors), np.inf)
     np.minimum.at(nearest, on_object, distance)
     some = clear[(first * sensor.camera.width + on[clear]) % SAMPLED == 0]
     return PixelTally(
-        np.bincount(on_object, minlength=sensor.mirrors),
-        np.bincount(mirror[stopped], minlength=sensor.mirrors),
+        np.bincount(on_object, minlength=len(sensor.setup.export.mirrors)),
+        np.bincount(mirror[stopped], minlength=len(sensor.setup.export.mirrors)),
         np.unique(second[stopped]).astype(np.int64),
         on.size,
         int((sensor.other[second] & ~stopped).sum()),
@@ -124,12 +103,12 @@ def _second(
     """The next facet along reflected rays, and which useful rays it stops before the object."""
     length = norm(lines.toward)
     start = lines.point + (LIFT_MM / length) * lines.toward
-    second = first_hits(sensor.scene, start, lines.toward)
+    second = first_hits(sensor.setup.scene, start, lines.toward)
     stopped = np.zeros(second.size, dtype=np.bool_)
     hit = np.flatnonzero(useful & (second >= 0))
     toward, begin = np.take(lines.toward, hit, axis=1), np.take(start, hit, axis=1)
-    at = distances_to_planes(sensor.scene, second[hit], begin, toward) * length[hit]
-    depth = np.sqrt(np.maximum(sensor.radius_mm**2 - distance[hit] ** 2, 0))
+    at = distances_to_planes(sensor.setup.scene, second[hit], begin, toward) * length[hit]
+    depth = np.sqrt(np.maximum(sensor.setup.radius**2 - distance[hit] ** 2, 0))
     stopped[hit] = at < norm(np.take(miss, hit, axis=1) - begin) - depth
     return second, stopped
 
@@ -138,8 +117,8 @@ def _spread(
     sensor: SensorScene, facet: NDArray[np.int32], d: Floats, toward: Floats, miss: Floats
 ) -> NDArray[np.float32]:
     """Distance at the object, across the fitted ray, of the ray off the facet's plane."""
-    plane = np.take(sensor.scene.planes, facet, axis=0).T
+    plane = np.take(sensor.setup.scene.planes, facet, axis=0).T
     pinhole = sensor.camera.pinhole[:, None]
-    t = (plane[3] + sensor.coating_mm - dot(pinhole, plane[:3])) / dot(d, plane[:3])
+    t = (plane[3] + sensor.setup.export.coating_mm - dot(pinhole, plane[:3])) / dot(d, plane[:3])
     point, bounced = pinhole + t * d, reflect_directions(d, plane[:3])
     return norm(crossings(point, bounced, toward) - miss).astype(np.float32)

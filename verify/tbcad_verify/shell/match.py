@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from tbcad_verify.mesh.fits import SurfaceFits
 from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import chunks, norm, unit
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.shell.recover import FLAT_MM, Recovery
@@ -55,7 +57,9 @@ def match(
     extra = np.setdiff1d(np.flatnonzero(recovery.mirror), segment)
     centre, radius = centre_and_radius_errors(mirrors, recovery.fits, segment, coating_mm)
     blur = np.where(mirrors.flat | (segment < 0), 0.0, recovery.fits.blur[segment])
-    surface = _surface_errors(mirrors, recovery, mesh, segment, coating_mm)
+    own = owners(segment, recovery.segments.count)[recovery.segments.label]
+    modelled = mirrors.surfaces().coated(-coating_mm)
+    surface = surface_errors(mesh, own, modelled, np.where(segment >= 0, 0.0, np.nan))
     return Match(segment, extra, centre, radius, blur, surface)
 
 
@@ -92,19 +96,23 @@ def owners(segment: Ints, count: int) -> Ints:
     return owner
 
 
-def _surface_errors(
-    mirrors: Mirrors, recovery: Recovery, mesh: Mesh, segment: Ints, coating_mm: float
-) -> Floats:
-    mirror = owners(segment, recovery.segments.count)[recovery.segments.label]
-    facets = np.flatnonzero(mirror >= 0)
-    modelled = mirrors.surfaces().coated(-coating_mm)
-    worst = np.where(segment >= 0, 0.0, np.nan)
+def mirror_corners(mesh: Mesh, own: Ints) -> Iterator[tuple[Ints, Floats]]:
+    """Mirrors (N,) of facets, and one corner (3, N) of each, mm; a part of them at a time.
+
+    `own`: (F,) mirror of each facet, negative for none.
+    """
+    facets = np.flatnonzero(own >= 0)
     for part in chunks(facets.size):
-        mine = mirror[facets[part]]
-        surfaces = modelled.take(mine)
         for k in range(3):
-            x = np.take(mesh.points, mesh.faces[facets[part], k], axis=0).T
-            np.maximum.at(worst, mine, np.abs(surfaces.height(x)))
+            corner = np.take(mesh.points, mesh.faces[facets[part], k], axis=0).T
+            yield own[facets[part]], corner
+
+
+def surface_errors(mesh: Mesh, own: Ints, surfaces: Surfaces, least: Floats) -> Floats:
+    """(M,) largest distance of each mirror's corners from its surface, or `least` (M,), mm."""
+    worst = least.copy()
+    for mine, x in mirror_corners(mesh, own):
+        np.maximum.at(worst, mine, np.abs(surfaces.take(mine).height(x)))
     return worst
 
 

@@ -8,9 +8,9 @@ follows from the other's; where a single bit differs, nothing does.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tbcad_verify.mesh.holes import RoundHoles
 from tbcad_verify.mesh.mesh import (
@@ -43,36 +43,24 @@ class ShellPart:
     """One part of a shell as measured; None where that failed."""
 
     part: Part  # its record
+    checks: list[Check]  # of the mesh
     mesh: Mesh | None  # its triangles, joined
-    edges: Edges | None  # of the mesh
     topology: Topology | None  # what is wrong with the mesh
     mass: MassProperties | None  # volume, area, centroid and box
     recovery: Recovery | None  # its patches and mirrors
-    no_topology: str  # why the topology is None
-    no_recovery: str  # why the recovery is None
     reason: str  # why something is None
+    edges: Edges | None  # of the mesh; None for a mirror image too
     # the part of which this is the mirror image; None where it was measured by itself
     image_of: Part | None = None
-
-    @property
-    def checks(self) -> list[Check]:
-        """Of the mesh."""
-        name = self.part.stl
-        return guarded(
-            check_names(TOPOLOGY, name),
-            lambda: mesh_checks(name, require(self.topology, self.no_topology)),
-        ) + guarded(
-            check_names(FOLDS, name),
-            lambda: [fold_check(name, require(self.recovery, self.no_recovery).folds)],
-        )
 
     def mirror_image(self, part: Part) -> ShellPart:
         """The same of a part whose mesh is this one's, reflected in the plane x = 0."""
         return replace(
             self,
             part=part,
+            checks=[replace(check, file=part.stl) for check in self.checks],
             mesh=self.mesh and flipped_mesh(self.mesh),
-            edges=self.edges and flipped_edges(self.edges),
+            edges=None,
             mass=self.mass and flipped_mass(self.mass),
             recovery=self.recovery and flipped_recovery(self.recovery),
             image_of=self.part,
@@ -99,16 +87,19 @@ def _second_is_image(export: Export, stls: list[Facets]) -> bool:
 
 
 def _measure_shell(export: Export, part: Part, facets: Facets) -> ShellPart:
-    radius_mm, pinhole = export.target_mm / 2, pinhole_of(export, part)
     mesh, no_mesh = attempt(lambda: mesh_from_facets(facets))
-    topology, no_topology = attempt(lambda: examine_topology(require(mesh, no_mesh), facets))
-    mass, no_mass = attempt(lambda: mass_properties(require(mesh, no_mesh)))
-    edges, _ = attempt(lambda: measure_edges(require(mesh, no_mesh)))
+    known = partial(require, mesh, no_mesh)
+    topology, no_topology = attempt(lambda: examine_topology(known(), facets))
+    mass, no_mass = attempt(lambda: mass_properties(known()))
+    edges, _ = attempt(lambda: measure_edges(known()))
     recovery, no_recovery = attempt(
-        lambda: recover(require(mesh, no_mesh), pinhole, radius_mm, edges)
+        lambda: recover(known(), pinhole_of(export, part), export.target_mm / 2, edges)
     )
+    solid, smooth = check_names(TOPOLOGY, part.stl), check_names(FOLDS, part.stl)
+    checks = guarded(solid, lambda: mesh_checks(part.stl, require(topology, no_topology)))
+    folds = guarded(smooth, lambda: [fold_check(part.stl, require(recovery, no_recovery).folds)])
     reason = no_mesh or no_recovery or no_topology or no_mass
-    return ShellPart(part, mesh, edges, topology, mass, recovery, no_topology, no_recovery, reason)
+    return ShellPart(part, checks + folds, mesh, topology, mass, recovery, reason, edges)
 
 
 def is_mirror_image(one: Facets, other: Facets) -> bool:
@@ -123,16 +114,10 @@ def is_mirror_image(one: Facets, other: Facets) -> bool:
 
 def flipped_mesh(mesh: Mesh) -> Mesh:
     """The mesh of the mirror image, its facets and vertices in the same order."""
-    twin = _reversed_half_edges(mesh.twin).reshape(-1, 3)[:, REVERSED].ravel().astype(np.int32)
+    twin = mesh.twin.reshape(-1, 3)[:, REVERSED].ravel()
+    twin = np.where(twin < 0, -1, twin - twin % 3 + REVERSED[twin % 3]).astype(np.int32)
     faces = np.ascontiguousarray(mesh.faces[:, ::-1])
     return Mesh(mesh.points * FLIP, faces, twin, _flipped_columns(mesh.area))
-
-
-def flipped_edges(edges: Edges) -> Edges:
-    """The edges of the mirror image, in the order of their half-edges."""
-    half = _reversed_half_edges(edges.half).astype(np.intp)
-    order = np.argsort(half)
-    return Edges(half[order], edges.angle[order], edges.noise[order])
 
 
 def flipped_mass(mass: MassProperties) -> MassProperties:
@@ -176,8 +161,3 @@ def flipped_measures(measures: PartMeasures, mesh: Mesh, mass: MassProperties) -
 def _flipped_columns(columns: Floats) -> Floats:
     """Mirror images of points or directions (3, N)."""
     return np.asarray(columns * FLIP[:, None])
-
-
-def _reversed_half_edges(half: NDArray[np.integer]) -> NDArray[np.integer]:
-    """Numbers of half-edges after each facet's corners are reversed; -1 stays."""
-    return np.where(half < 0, -1, half - half % 3 + REVERSED[half % 3])

@@ -12,7 +12,6 @@ from tbcad_verify.mesh.rays import ImagePairScene, RayScene, build_scene, first_
 from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.record.export import Camera, Export, Part
 from tbcad_verify.record.poses import VirtualCameras, virtual_cameras
-from tbcad_verify.shell.light import SensorScene
 from tbcad_verify.shell.match import Match, match, owners
 from tbcad_verify.shell.recover import Recovery, join_recoveries
 from tbcad_verify.types import Floats, Ints
@@ -85,22 +84,13 @@ class OpticalSetup:
         return owners(self.match.segment, self.recovery.segments.count)
 
     def sensor_scene(self, camera: Camera) -> SensorScene:
-        """What one camera sees, as the trace of the full sensor needs it."""
+        """What light meets, for one camera."""
         owner, mine = self.owner(), self.mine(camera)
         owner = np.where((owner >= 0) & mine[owner], owner, -1)
         label = self.recovery.segments.label
         facets = np.append(owner[label], -1).astype(np.int32)
-        return SensorScene(
-            self.scene,
-            self._own_scene(camera, facets),
-            camera,
-            facets,
-            np.append(self.recovery.mirror[label], False),
-            self.seen(camera),
-            len(self.export.mirrors),
-            self.radius,
-            self.export.coating_mm,
-        )
+        mirror, own = np.append(self.recovery.mirror[label], False), self._own_scene(camera, facets)
+        return SensorScene(self, camera, own, facets, mirror, self.seen(camera))
 
     def _own_scene(self, camera: Camera, owner: NDArray[np.int32]) -> RayScene:
         """The scene without an image that hides none of a camera's mirrors and has none of them."""
@@ -119,6 +109,21 @@ class OpticalSetup:
             for k in patches.tolist()
         }
         return sorted(matches | ({"nothing"} if (facets < 0).any() else set()))
+
+
+@dataclass(frozen=True)
+class SensorScene:
+    """What light meets, for one camera."""
+
+    setup: OpticalSetup  # all parts
+    camera: Camera  # the real camera
+    # as much of all facets as tells which of this camera's mirrors rays from the pinhole meet first
+    own: RayScene
+    # (F + 1,) mirror of each facet that belongs to this camera's mirrors, else -1; the last entry
+    # stands for a ray that hits nothing
+    owner: NDArray[np.int32]
+    other: NDArray[np.bool_]  # (F + 1,) true for facets of any mirror
+    seen: PreparedSurfaces  # from the pinhole, one a recorded mirror
 
 
 def set_up(

@@ -62,7 +62,7 @@ def trace_outline(
     corner = mesh.faces.reshape(-1)
     facet, k = np.divmod(half, 3)
     start, end, far = (mesh.points[corner[3 * facet + (k + j) % 3]].T for j in range(3))
-    on_mesh = _spread(start[..., None] + (end - start)[..., None] * SAMPLES)
+    on_mesh = (start[..., None] + (end - start)[..., None] * SAMPLES).reshape(3, -1)
     many = SAMPLES.size
     height = np.repeat(_height(start, end, far), many)
     mirror = owner[label[facet]]
@@ -154,10 +154,6 @@ def _outline_edges(
     return half[edge], beyond[edge].astype(np.intp)
 
 
-def _spread(values: Floats) -> Floats:
-    return np.ascontiguousarray(values.reshape(len(values), -1))
-
-
 def _height(start: Floats, end: Floats, far: Floats) -> Floats:
     edge, side = end - start, far - start
     along = dot(side, edge) / np.maximum(dot(edge, edge), 1e-300)
@@ -181,19 +177,10 @@ def _onto_coats(
     surface = fits.surfaces.take(inside).coated(coat)
     both = (beyond >= 0) & follows_fit(fits)[beyond]
     facing = np.where(both, beyond, inside)
-    other = fits.surfaces.take(facing)
-    other = _mixed(coated[facing], other.coated(coat), other)
+    other = fits.surfaces.take(facing).coated(np.where(coated[facing], coat, 0.0))
     for _ in range(NEWTON):
         x = x - _least_step(surface, other, both, x)
     return x
-
-
-def _mixed(choose: NDArray[np.bool_], one: Surfaces, two: Surfaces) -> Surfaces:
-    return Surfaces(
-        np.where(choose, one.point, two.point),
-        np.where(choose, one.normal, two.normal),
-        np.where(choose, one.curvature, two.curvature),
-    )
 
 
 def _least_step(surface: Surfaces, other: Surfaces, both: NDArray[np.bool_], x: Floats) -> Floats:

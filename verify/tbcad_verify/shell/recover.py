@@ -14,13 +14,7 @@ from numpy.typing import NDArray
 from tbcad_verify.mesh.fits import PatchVertices, SurfaceFits, fit_surfaces, patch_vertices
 from tbcad_verify.mesh.holes import round_holes
 from tbcad_verify.mesh.mesh import Mesh, connected_groups, sorted_unique
-from tbcad_verify.mesh.segments import (
-    Edges,
-    Segmentation,
-    count_folds,
-    measure_edges,
-    segment_mesh,
-)
+from tbcad_verify.mesh.segments import Edges, Segmentation, count_folds, measure_edges, segment_mesh
 from tbcad_verify.mesh.surfaces import Surfaces, reflect_directions
 from tbcad_verify.mesh.vectors import dot, joined, norm
 from tbcad_verify.types import Bools, Floats, Ints

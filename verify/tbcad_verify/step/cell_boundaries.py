@@ -12,9 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from tbcad_verify.mesh.mesh import connected_groups
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.mesh.vectors import chunks, joined
 from tbcad_verify.step.map_arcs import (
@@ -25,12 +24,7 @@ from tbcad_verify.step.map_arcs import (
     joined_arcs,
     quadratic_roots,
 )
-from tbcad_verify.step.stereographic import (
-    MapCircles,
-    SurfaceMaps,
-    map_circles,
-    surface_maps,
-)
+from tbcad_verify.step.stereographic import MapCircles, SurfaceMaps, map_circles, surface_maps
 from tbcad_verify.types import Bools, Floats, Ints
 
 FIRST = 20  # circles that each mirror starts with
@@ -137,9 +131,7 @@ def arc_loops(arcs: MapArcs, spread: float) -> tuple[Ints, Bools]:
     gap = np.abs(start[:, other] - end[:, index]).max(axis=0)
     order = np.lexsort((gap, index))
     best = order[np.unique(index[order], return_index=True)[1]]
-    count = len(arcs.mirror)
-    graph = coo_array((np.ones(count, dtype=np.int8), (index[best], other[best])), (count, count))
-    label = connected_components(graph, directed=False)[1].astype(np.intp)
+    label = connected_groups(len(arcs.mirror), index[best], other[best])[1].astype(np.intp)
     return label, ~(gap[best] <= CLOSED * spread)
 
 

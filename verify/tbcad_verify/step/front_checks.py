@@ -3,34 +3,31 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad_verify.mesh.mesh import MassProperties
-from tbcad_verify.record.export import Camera, Export, Part
-from tbcad_verify.record.flange_holes import ends_check
+from tbcad_verify.record.export import Camera, Export, Mandrel, Part
+from tbcad_verify.record.flange_holes import Hole, ends_check
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
     Unknown,
     at_most,
-    attempt,
     each_at_most,
-    guarded,
     require,
     short_list,
 )
 from tbcad_verify.step.part21 import StepTable
-from tbcad_verify.step.part_checks import Checks, PartComparison, names_of, run_checks
-from tbcad_verify.step.pedestals import Grooves, read_grooves, wall_errors
+from tbcad_verify.step.part_checks import Checks, PartComparison
+from tbcad_verify.step.pedestals import Grooves, fronts, read_grooves, wall_errors
+from tbcad_verify.step.solids_text import Casing, bores, read_casing
 from tbcad_verify.step.sphere_union import ClosedFormCells, bounds, cells_of_export
-from tbcad_verify.step.step_file import StepFaces, StepFile, known
+from tbcad_verify.step.step_file import StepFaces, StepFile, known, load
 from tbcad_verify.types import Floats, Ints
 
 SURFACE_MM = 1e-8  # the file's digits, 100 mm from the origin
@@ -41,60 +38,71 @@ ENDS_MM = 1e-6  # ten times the precision to which the kernel joins corners and 
 
 @dataclass(frozen=True, kw_only=True)
 class FrontComparison(PartComparison):
-    """The mirrors of a STEP file and all that they are compared with."""
+    """The mirrors of a STEP file and all that they are compared with, and what closes the solid."""
 
+    export: Export  # the record
+    part: Part  # its record
     mirrors: Mirrors  # the camera's m mirrors, as recorded
-    foreign: frozenset[str]  # ids of all other mirrors
-    coating_mm: float  # that is not part of the solid
     face: Ints  # (m,) each mirror's face; -1 where no face, or more than one, has its name
     front: StepFaces  # the file's faces as seen from the light
+    fronts: frozenset[str]  # names of the faces that are mirrors, or walls below them
     cells: ClosedFormCells  # (m,) in closed form
     grooves: Grooves | None  # between pedestals, in the file
-    part: Part  # its record
-    export: Export  # the record
-    camera: Camera  # that the part is for
+    holes: tuple[Hole, ...]  # round, by diameter; those of a negative are blind
+    casing: Casing | None  # of a shell: its back
+
+    @property
+    def camera(self) -> Camera:
+        """That the part is for."""
+        return self.export.cameras[self.part.camera]
 
 
-AnyPart = TypeVar("AnyPart", bound=Part)
-AnyComparison = TypeVar("AnyComparison", bound=FrontComparison)
+def compare(export: Export, part: Part, read: StepFile | Unknown) -> FrontComparison:
+    """The STEP file of a shell or a negative with all that it is compared with but its mesh.
 
-
-def front_fields(
-    export: Export, part: Part, file: StepFile, table: StepTable, front: StepFaces
-) -> dict[str, Any]:
-    """The fields of a `FrontComparison` of a camera's part, but for the mesh's mass."""
-    mine = export.mirrors.camera == part.camera
-    mirrors = export.mirrors.take(np.flatnonzero(mine))
-    count = Counter(file.faces.names)
-    index = {name: k for k, name in enumerate(file.faces.names)}
+    Unknown: it could not be read, or lacks the walls of pedestals or the back that it must have.
+    """
+    file, table = known(read), StepTable(load(export.folder, part.step).text())
+    names, negative = file.faces.names, isinstance(part, Mandrel)
+    front = _turned(file.faces) if negative else file.faces
+    mirrors = export.mirrors.take(np.flatnonzero(export.mirrors.camera == part.camera))
+    count, index = Counter(names), {name: k for k, name in enumerate(names)}
     pedestals = export.spec.shell.edges == "pedestal"
     grooves = read_grooves(table, front, mirrors.ids) if pedestals else None
-    return {
-        "name": part.name,
-        "file": file,
-        "mesh_mass": None,
-        "mesh_error": export.mesh_error_mm,
-        "mirrors": mirrors,
-        "foreign": frozenset(export.mirrors.ids) - frozenset(mirrors.ids),
-        "coating_mm": export.coating_mm,
-        "face": np.array([index[name] if count[name] == 1 else -1 for name in mirrors.ids]),
-        "front": front,
-        "cells": cells_of_export(export, part.camera, grooves),
-        "grooves": grooves,
-        "part": part,
-        "export": export,
-        "camera": export.cameras[part.camera],
-    }
+    mine = fronts(names, frozenset(mirrors.ids))
+    return FrontComparison(
+        name=part.name,
+        file=file,
+        mesh_mass=None,
+        mesh_error=export.mesh_error_mm,
+        export=export,
+        part=part,
+        mirrors=mirrors,
+        face=np.array([index[name] if count[name] == 1 else -1 for name in mirrors.ids]),
+        front=front,
+        fronts=mine,
+        cells=cells_of_export(export, part.camera, grooves),
+        grooves=grooves,
+        holes=bores(table, mine),
+        casing=None if negative else read_casing(table, mine),
+    )
+
+
+def _turned(faces: StepFaces) -> StepFaces:
+    """The faces of a negative as those of the shell, on the other side of its mirrors."""
+    outward = np.where(faces.kind == "sphere", faces.inward, faces.outward)
+    return replace(faces, normal=-faces.normal, outward=outward)
 
 
 def names(name: CheckName, part: FrontComparison) -> Check:
     """Every mirror's name on exactly one face; no name twice, none empty."""
     ids, count = set(part.mirrors.ids), Counter(part.file.faces.names)
+    foreign = set(part.export.mirrors.ids) - ids
     faults = [one for one in part.mirrors.ids if count[one] != 1]
     faults += [
         one or "(empty)" for one, n in count.items() if one not in ids and (n != 1 or not one)
     ]
-    faults += [one for one in count if one in part.foreign]
+    faults += [one for one in count if one in foreign]
     detail = f"not on exactly one face, or another part's: {short_list(faults)}"
     return at_most(name, len(faults), 0, detail)
 
@@ -106,9 +114,9 @@ def surfaces(name: CheckName, part: FrontComparison) -> Check:
     point = _of(part, faces.point)
     spheres = np.maximum(
         np.linalg.norm(point - centre, axis=1),
-        np.abs(_of(part, faces.radius) - (mirrors.radius_mm - part.coating_mm)),
+        np.abs(_of(part, faces.radius) - (mirrors.radius_mm - part.export.coating_mm)),
     )
-    under = apex - part.coating_mm * normal
+    under = apex - part.export.coating_mm * normal
     tilt = np.linalg.norm(_of(part, faces.normal) - normal, axis=1)
     planes = np.maximum(np.abs(((point - under) * normal).sum(axis=1)), tilt)
     error = np.where(mirrors.flat, planes, spheres)
@@ -184,42 +192,6 @@ def worst_of(name: CheckName, ids: Sequence[str], error: Floats, limit: float, u
     """The worst mirror; one without a face counts as infinitely wrong."""
     error = np.where(np.isnan(error), np.inf, error)
     return each_at_most(name, ids, error, limit, unit)
-
-
-def each_compared(
-    parts: Iterable[AnyPart],
-    files: Mapping[str, StepFile | Unknown],
-    compare: Callable[[AnyPart, StepFile | Unknown], AnyComparison],
-) -> dict[str, AnyComparison | Unknown]:
-    """What `compare` gives for each part with a STEP file, or why not, by part."""
-    found: dict[str, AnyComparison | Unknown] = {}
-    for part in parts:
-        if part.step:
-            comparison, reason = attempt(partial(compare, part, files[part.name]))
-            found[part.name] = comparison or Unknown(reason)
-    return found
-
-
-def each_checked(
-    export: Export,
-    parts: Iterable[Part],
-    checks: Checks,
-    masses: Mapping[str, MassProperties],
-    comparisons: Mapping[str, AnyComparison | Unknown],
-) -> list[Check]:
-    """The checks of each part with a STEP file, with its mesh; unknown where they break."""
-    chosen = {**checks, **(WALLS if export.spec.shell.edges == "pedestal" else {})}
-
-    def of_part(part: Part) -> list[Check]:
-        comparison = known(comparisons[part.name])
-        return run_checks(chosen, part.step, replace(comparison, mesh_mass=masses.get(part.name)))
-
-    return [
-        check
-        for part in parts
-        if part.step
-        for check in guarded(names_of(chosen, part.step), partial(of_part, part))
-    ]
 
 
 WALLS: Checks = {"step walls": ("mm", walls)}

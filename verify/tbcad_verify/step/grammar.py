@@ -90,10 +90,11 @@ def _refuse_counts(table: StepTable, count: Counter[str]) -> None:
     for name, number in wanted.items():
         if count[name] != number:
             raise ValueError(f"{count[name]} times {name}, allowed is {number}")
-    inner = [(one, _product(table, one)) for one in table.of("NEXT_ASSEMBLY_USAGE_OCCURRENCE")]
-    if len({product for _, product in inner}) != len(inner):
+    occurrences = table.of("NEXT_ASSEMBLY_USAGE_OCCURRENCE")
+    inner = [table.product(table.references(one)[1]) for one in occurrences]
+    if len(set(inner)) != len(inner):
         raise ValueError("a product is in the assembly twice")
-    for one, product in inner:
+    for one, product in zip(occurrences, inner, strict=True):
         if LABEL.findall(table.bodies[one])[1][1:-1] != product:
             raise ValueError(f"#{one} names {product} otherwise")
     labels = [name for face in table.of(FACE) if (name := table.label(face))]
@@ -104,12 +105,6 @@ def _refuse_counts(table: StepTable, count: Counter[str]) -> None:
         raise ValueError(f"a face of {products[0]} is named {labels[0]}, allowed is no name")
     if other := [one for one in labels if not re.fullmatch(rules["face"], one)]:
         raise ValueError(f"a face is named {other[0]}, allowed is {rules['face']}")
-
-
-def _product(table: StepTable, occurrence: int) -> str:
-    """Name of the product that an occurrence puts into another."""
-    formation = table.references(table.references(occurrence)[1])[0]
-    return table.label(table.references(formation)[0])
 
 
 def _matched(number: int, kind: str, body: str) -> list[tuple[Form, tuple[str, ...]]]:

@@ -20,7 +20,7 @@ from tbcad_verify.types import Floats
 TEXT = r"'(?:[^']++|'')*+'"
 # An entity, or all that is left where none is.
 ENTITY = re.compile(
-    rf"#(\d{{1,15}}+) ?= ?([A-Z]\w*+)?\(((?:[^';]*+{TEXT})*+[^';]*)\);\n|((?s:.++))",
+    rf"#(\d{{1,15}}+) ?= ?([A-Z]\w*+)?\(((?:[^';]*+{TEXT})*+[^';]*)\);\n|((?s:.++))"
 )
 START = re.compile(r"\s*+ISO-10303-21;\s*+HEADER;")
 HEADER_END = re.compile(rf"{TEXT}|(?P<end>ENDSEC;\s*+DATA;\n)|(?P<open>')")
@@ -83,6 +83,13 @@ class StepTable:
     def label(self, number: int) -> str:
         """First text of an entity: its name."""
         return str(LABEL.findall(self.bodies[number])[0])[1:-1].replace("''", "'")
+
+    def product(self, definition: int) -> str:
+        """Name of what a product definition defines. ValueError: it is no product."""
+        product = self.references(self.references(definition)[0])[0]
+        if self.kinds[product] != "PRODUCT":
+            raise ValueError(f"#{definition} defines no product")
+        return self.label(product)
 
     def forward(self, face: int) -> bool:
         """Whether a face has its surface's sense."""

@@ -8,7 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad_verify.mesh.mesh import MassProperties
-from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, guarded_each, short_list
+from tbcad_verify.report.checks import (
+    Check,
+    CheckName,
+    Unknown,
+    at_most,
+    guarded,
+    guarded_each,
+    short_list,
+)
 from tbcad_verify.step.step_file import StepFile
 
 GAP_MM = 1e-5  # a hundred times the kernel's own precision
@@ -40,14 +48,14 @@ class PartComparison:
 Checks = Mapping[str, tuple[str, Callable[..., Check]]]  # unit and function of each, by name
 
 
-def names_of(checks: Checks, file: str) -> list[CheckName]:
-    """Name, file and unit of every check."""
-    return [(name, file, unit) for name, (unit, _) in checks.items()]
+def file_checks(checks: Checks, file: str, compare: Callable[[], PartComparison]) -> list[Check]:
+    """All checks of one file, each unknown by itself; all where it cannot be compared.
 
-
-def run_checks(checks: Checks, file: str, comparison: PartComparison) -> list[Check]:
-    """All checks of one file, each unknown by itself; `file` is its name in the report."""
-    return guarded_each(names_of(checks, file), [job for _, job in checks.values()], comparison)
+    `file`: its name in the report.
+    """
+    names = [(name, file, unit) for name, (unit, _) in checks.items()]
+    jobs = [job for _, job in checks.values()]
+    return guarded(names, lambda: guarded_each(names, jobs, compare()))
 
 
 def solid(name: CheckName, part: PartComparison) -> Check:

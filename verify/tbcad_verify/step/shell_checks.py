@@ -1,201 +1,162 @@
-"""A STEP file compared with the mesh, the record, the closed form, and its own claims.
+"""STEP files of shells and of their negatives: mirrors, what closes the solid, mass and claims.
 
-Of the radii, rule "traced" gives every mirror the coverage that is asked for, with the margin of
-the spec or one of its own, unless the mirror has the largest radius allowed; "paper" gives it the
-radius of equation 2; "flat" gives it none.
+A negative has the shell's mirrors with the material on their other side.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from tbcad_verify.mesh.mesh import MassProperties
-from tbcad_verify.record.export import Export, Part
-from tbcad_verify.record.flange_holes import HoleLimits, flanges, hole_faults
+from tbcad_verify.record.export import Export, Mandrel, Part
+from tbcad_verify.record.flange_holes import (
+    HoleLimits,
+    X,
+    Z,
+    blind_hole_faults,
+    flanges,
+    hole_faults,
+)
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
     Unknown,
     at_most,
     attempt,
-    guarded,
+    no_faults,
     require,
     short_list,
-    worst_offenders,
 )
-from tbcad_verify.step.front_checks import (
-    CELL_SHARE,
-    FrontComparison,
-    each_checked,
-    each_compared,
-    front_fields,
-    worst_of,
-)
-from tbcad_verify.step.front_checks import CHECKS as FRONT_CHECKS
-from tbcad_verify.step.part21 import StepTable
-from tbcad_verify.step.part_checks import (
-    MASS_CHECKS,
-    SOLID_CHECKS,
-    Checks,
-)
-from tbcad_verify.step.pedestals import Grooves, fronts
-from tbcad_verify.step.solids_text import Casing, read_casing, wall
-from tbcad_verify.step.sphere_union import cells_of_export
-from tbcad_verify.step.step_file import StepFile, known, load
-from tbcad_verify.types import Bools, Floats
+from tbcad_verify.step import front_checks
+from tbcad_verify.step.front_checks import CELL_SHARE, WALLS, FrontComparison, compare
+from tbcad_verify.step.part_checks import MASS_CHECKS, SOLID_CHECKS, Checks, file_checks
+from tbcad_verify.step.solids_text import Casing, wall
+from tbcad_verify.step.step_file import StepFile, known
 
 WALL_MM = 1e-3  # the deepest point may lie between corners
 HOLE_LIMITS = HoleLimits(size=1e-6, place=1e-3)  # lengths along a section are sums of chords
-COVERAGE_MM = 0.1  # spheres fitted to coarse facets, and outlines between their corners
-COVERAGE = ("recorded coverage", "mirrors.csv", "mm")
-AREAS = ("cell areas", "mirrors.csv", "of the area")
-RULE_MM = 1e-3  # by which a coverage may be off; the search for radii ends at a tenth of it
-RULE_SHARE = 1e-6  # of a radius
-RULE = ("radius rule", "mirrors.csv", "mirrors")
+PLANE_MM = 1e-8  # of a negative's joining planes and the bottoms of holes
+BLIND_LIMITS = HoleLimits(size=1e-6, place=1e-6)
+Comparisons = Mapping[str, FrontComparison | Unknown]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ShellComparison(FrontComparison):
-    """A shell's STEP file and all that it is compared with."""
-
-    casing: Casing  # back and holes
-    wall: float | Unknown  # thickness behind the deepest valley, mm
-
-
-def shell_comparisons(
-    export: Export, files: dict[str, StepFile | Unknown]
-) -> dict[str, ShellComparison | Unknown]:
-    """Each shell's STEP file with all that it is compared with but its mesh, or why not."""
-    return each_compared(export.parts, files, partial(_comparison, export))
+def compare_all(export: Export, files: Mapping[str, StepFile | Unknown]) -> Comparisons:
+    """The STEP files of all shells and negatives as `compare` has them, or why not, by part."""
+    found: dict[str, FrontComparison | Unknown] = {}
+    for part in (*export.parts, *export.mandrels):
+        if part.step:
+            comparison, reason = attempt(partial(compare, export, part, files[part.name]))
+            found[part.name] = comparison or Unknown(reason)
+    return found
 
 
-def shell_step_checks(
+def front_step_checks(
     export: Export,
-    masses: dict[str, MassProperties],
-    comparisons: dict[str, ShellComparison | Unknown],
-    coverage: Floats | None,
-    areas: Sequence[Check],
+    parts: Sequence[Part],
+    masses: Mapping[str, MassProperties],
+    comparisons: Comparisons,
 ) -> list[Check]:
-    """All checks of all STEP files that the record names.
+    """The checks of each part with a STEP file, with its mesh; unknown where they break."""
+    walls = WALLS if export.spec.shell.edges == "pedestal" else {}
 
-    `coverage`: (M,) mm, as measured on spheres.
-    """
-    checks = each_checked(export, export.parts, CHECKS, masses, comparisons)
-    recorded = [*areas]
-    recorded += guarded([RULE], lambda: [rule_check(export)])
-    recorded += guarded([COVERAGE], lambda: [_recorded_coverage(export, coverage)])
-    return recorded + checks
+    def compared(part: Part) -> FrontComparison:
+        return replace(known(comparisons[part.name]), mesh_mass=masses.get(part.name))
 
-
-def area_checks(export: Export, grooves: Mapping[str, Grooves | None]) -> list[Check]:
-    """The check of the recorded areas, which takes long; with the grooves of each camera."""
-    return guarded([AREAS], lambda: [_recorded_areas(export, grooves)])
-
-
-def _recorded_areas(export: Export, grooves: Mapping[str, Grooves | None]) -> Check:
-    """Areas of the reflecting surfaces as recorded, against the closed form of the spheres."""
-    mirrors, area = export.mirrors, np.full(len(export.mirrors), np.nan)
-    for camera in export.cameras:
-        cells = cells_of_export(export, camera, grooves.get(camera), coated=True)
-        area[mirrors.camera == camera] = cells.area
-    error = np.abs(mirrors.cell_area_mm2 / area - 1)
-    return worst_of(AREAS, mirrors.ids, error, CELL_SHARE, "of its area off")
+    return [
+        check
+        for part in parts
+        if part.step
+        for check in file_checks(
+            {**(NEGATIVE if isinstance(part, Mandrel) else SHELL), **walls},
+            part.step,
+            partial(compared, part),
+        )
+    ]
 
 
-def _recorded_coverage(export: Export, coverage: Floats | None) -> Check:
-    """Coverage as recorded, against what rays found."""
-    measured = require(coverage, "coverage was not measured")
-    error = np.abs(export.mirrors.coverage_mm - measured)
-    return worst_of(COVERAGE, export.mirrors.ids, error, COVERAGE_MM, "mm")
-
-
-def _comparison(export: Export, part: Part, read: StepFile | Unknown) -> ShellComparison:
-    file, table = known(read), StepTable(load(export.folder, part.step).text())
-    fields = front_fields(export, part, file, table, file.faces)
-    casing = read_casing(table, fronts(file.faces.names, frozenset(fields["mirrors"].ids)))
-    thickness, no_wall = attempt(lambda: wall(casing, fields["camera"], export.semi_minor_mm))
-    thick = Unknown(no_wall) if thickness is None else thickness
-    return ShellComparison(**fields, casing=casing, wall=thick)
-
-
-def _wall(name: CheckName, shell: ShellComparison) -> Check:
+def _wall(name: CheckName, shell: FrontComparison) -> Check:
     """Material behind the deepest valley, as the spec has it."""
-    asked = shell.export.spec.shell.wall_mm
-    measured = known(shell.wall)
+    asked, export = shell.export.spec.shell.wall_mm, shell.export
+    measured = wall(_casing(shell), shell.camera, export.semi_minor_mm)
     detail = f"the wall is {measured:.3f} mm, the spec has {asked:g}"
     return at_most(name, abs(measured - asked), WALL_MM, detail)
 
 
-def _holes(name: CheckName, shell: ShellComparison) -> Check:
+def _holes(name: CheckName, shell: FrontComparison) -> Check:
     """Bolt and dowel holes, as the spec has them."""
-    beyond = shell.casing.semi_axes[1] - shell.export.semi_minor_mm
+    beyond = _casing(shell).semi_axes[1] - shell.export.semi_minor_mm
     wanted = flanges(shell.export, shell.camera, beyond)
-    faults = hole_faults(shell.casing.holes, wanted, HOLE_LIMITS)
-    return at_most(name, len(faults), 0, short_list(faults))
+    return no_faults(name, hole_faults(shell.holes, wanted, HOLE_LIMITS))
 
 
-CHECKS: Checks = {
+def _casing(shell: FrontComparison) -> Casing:
+    return require(shell.casing, "it is no shell")
+
+
+def _planes(name: CheckName, part: FrontComparison) -> Check:
+    """The seam is x = 0, the foot is z = foot, and all other planes are bottoms of holes."""
+    faces, side = part.file.faces, float(np.sign(part.camera.pinhole[X]))
+    wanted = {"seam": (X, 0.0, -side), "foot": (Z, part.export.foot_z_mm, -1.0)}
+    faults = [one for one in wanted if one not in faces.names]
+    for k, one in enumerate(faces.names):
+        plane = one.partition("_")[0]
+        if one in part.fronts or (one not in wanted and faces.kind[k] == "other"):
+            continue
+        if plane not in wanted or faces.kind[k] != "plane":
+            faults.append(one)
+            continue
+        axis, place, outward = wanted[plane]
+        square = abs(faces.normal[k, axis] - outward) <= PLANE_MM
+        depths = [0.0] if one == plane else [hole.depth for hole in part.holes]
+        off = min(abs(faces.point[k, axis] - place + outward * depth) for depth in depths)
+        if not (square and off <= PLANE_MM and faces.outward[k]):
+            faults.append(one)
+    return at_most(name, len(faults), 0, f"not in their planes: {short_list(faults)}")
+
+
+def _blind_holes(name: CheckName, part: FrontComparison) -> Check:
+    """Sizes and numbers of the flanges' holes, and walls to all mirrors."""
+    faults = blind_hole_faults(part.holes, part.export, part.part.camera, BLIND_LIMITS)
+    return no_faults(name, faults)
+
+
+def _enclosed(name: CheckName, part: FrontComparison) -> Check:
+    """The solid's volume, against the closed form of the mirrors and a foot without its holes.
+
+    Cones from the origin to mirrors, walls of pedestals and foot fill the negative; the plane of
+    the seam holds the origin.
+    """
+    faces = part.file.faces
+    bores = np.array([np.pi * hole.radius**2 for hole in part.holes])
+    along_z = np.array([abs(hole.axis[Z]) > abs(hole.axis[X]) for hole in part.holes])
+    depth = np.array([hole.depth for hole in part.holes])
+    base = float(faces.area[faces.names.index("foot")]) + float(bores[along_z].sum())
+    ids = part.fronts.difference(part.mirrors.ids)
+    walls = [k for k, one in enumerate(faces.names) if one in ids]
+    height = (faces.middle[walls] * faces.normal[walls]).sum(axis=1)
+    expected = -float(part.cells.volume.sum()) - part.export.foot_z_mm * base / 3
+    expected += float((height * faces.area[walls]).sum() / 3) - float(bores @ depth)
+    volume = part.file.mass.volume
+    detail = f"{volume:.6f} mm^3, {expected:.6f} by mirrors, foot and holes"
+    return at_most(name, abs(volume / expected - 1), CELL_SHARE, detail)
+
+
+SHELL: Checks = {
     **SOLID_CHECKS,
-    **FRONT_CHECKS,
+    **front_checks.CHECKS,
     "step wall": ("mm", _wall),
     "step holes": ("faults", _holes),
     **MASS_CHECKS,
 }
-
-
-def rule_check(export: Export) -> Check:
-    """The radii are those of the spec's rule, margin and largest radius."""
-    mirrors, rule = export.mirrors, export.spec.mirrors.radius_rule
-    good = {"flat": _flat, "paper": _paper, "traced": _traced}[rule](export)
-    detail = worst_offenders(mirrors.ids, mirrors.radius_mm, "mm", ~good, ".6g")
-    return at_most(RULE, int((~good).sum()), 0, f"radii not by rule {rule}: {detail}")
-
-
-def _flat(export: Export) -> Bools:
-    return export.mirrors.flat
-
-
-def _paper(export: Export) -> Bools:
-    """Equation 2 of the paper, where it gives a radius and none above the largest."""
-    mirrors, largest = export.mirrors, _largest(export)
-    half = np.radians(mirrors.theta1_deg - mirrors.theta0_deg) / 2
-    curvature = np.maximum(np.sin(half) / mirrors.size_mm, 1 / largest)
-    return np.asarray(np.abs(mirrors.radius_mm * curvature - 1) <= RULE_SHARE)
-
-
-def _traced(export: Export) -> Bools:
-    mirrors, largest = export.mirrors, _largest(export)
-    margin = _margins(export)
-    beyond = mirrors.coverage_mm - (export.target_mm + margin)
-    # Where spheres of the largest radius would not meet, tbcad halves the least curvature of all.
-    flatter = mirrors.radius_mm / largest
-    halvings = np.log2(np.max(flatter, initial=1.0))
-    good = (np.abs(beyond) <= RULE_MM) | ((flatter >= 1 - RULE_SHARE) & (beyond >= -RULE_MM))
-    if abs(halvings - np.round(halvings)) > RULE_SHARE:
-        good &= flatter <= 1 + RULE_SHARE
-    return np.asarray(good & (margin >= export.spec.mirrors.margin_mm))
-
-
-def _margins(export: Export) -> Floats:
-    """(M,) margin of each mirror, mm; NaN where there are own margins for another number of them.
-
-    Both cameras' mirrors have the same, in the order of the file.
-    """
-    mirrors, own = export.mirrors, export.spec.mirrors.own_margins_mm
-    if not own:
-        return np.full(len(mirrors.camera), export.spec.mirrors.margin_mm)
-    margins = np.full(len(mirrors.camera), np.nan)
-    for camera in set(mirrors.camera.tolist()):
-        rows = np.flatnonzero(mirrors.camera == camera)
-        if len(rows) == len(own):
-            margins[rows] = own
-    return margins
-
-
-def _largest(export: Export) -> Floats:
-    """(M,) largest radius of each mirror, mm."""
-    return export.spec.mirrors.max_radius_widths * export.mirrors.size_mm
+NEGATIVE: Checks = {
+    **SOLID_CHECKS,
+    **front_checks.CHECKS,
+    "step mandrel planes": ("faults", _planes),
+    "step mandrel holes": ("faults", _blind_holes),
+    "step mandrel volume": ("of the volume", _enclosed),
+    **MASS_CHECKS,
+}

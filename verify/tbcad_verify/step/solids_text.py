@@ -62,7 +62,7 @@ def read_solids(text: str) -> dict[str, TextSolid]:
         refuse_foreign(table)
         _refuse_moved(table)
         solids = [
-            (_product(table, shape), solid)
+            (table.product(table.references(shape)[-1]), solid)
             for shape, representation in map(
                 table.references, table.of("SHAPE_DEFINITION_REPRESENTATION")
             )
@@ -150,15 +150,6 @@ def _refuse_moved(table: StepTable) -> None:
                 raise Unknown("the assembly moves a part")
 
 
-def _product(table: StepTable, shape: int) -> str:
-    definition = table.references(shape)[-1]
-    formation = table.references(definition)[0]
-    product = table.references(formation)[-1]
-    if table.kinds[product] != "PRODUCT":
-        raise Unknown("a solid is no product's")
-    return table.label(product)
-
-
 def _colours(table: StepTable) -> Iterator[tuple[int, tuple[float, ...]]]:
     """Each styled solid, and its colour and opacity."""
     for item in table.of("STYLED_ITEM"):
@@ -193,17 +184,16 @@ def round_face(table: StepTable, face: int) -> RoundFace | None:
 
 @dataclass(frozen=True)
 class Casing:
-    """Back and holes of one shell."""
+    """The back of one shell."""
 
     semi_axes: tuple[float, float]  # of the back along the axis and across it, mm
     centre: Floats  # (3,) of the back, mm
     axis: Floats  # (3,) unit, of the back
     valleys: Floats  # (V, 3) corners of the mirrors and of the walls below them, mm
-    holes: tuple[Hole, ...]  # round, by diameter, from the spec
 
 
 def read_casing(table: StepTable, mirrors: frozenset[str]) -> Casing:
-    """Find the back, the mirrors' corners and all round holes.
+    """Find the back and the mirrors' corners.
 
     Unknown: there is no back, more than one, or no spheroid.
     """
@@ -218,7 +208,7 @@ def read_casing(table: StepTable, mirrors: frozenset[str]) -> Casing:
     corners = [one for one in table.reached(*faces) if table.kinds.get(one) == "VERTEX_POINT"]
     valleys = [table.triple(table.references(one)[0]) for one in sorted(corners)]
     at = np.array(valleys).reshape(-1, 3)
-    return Casing((major, minor), *table.placement(place), at, bores(table, mirrors))
+    return Casing((major, minor), *table.placement(place), at)
 
 
 def bores(table: StepTable, mirrors: frozenset[str]) -> tuple[Hole, ...]:

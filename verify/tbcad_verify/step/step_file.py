@@ -118,41 +118,48 @@ def examine_all(blobs: Sequence[FileBytes], processes: Processes) -> list[StepFi
         return [_answer(asked[k]) for k in range(len(blobs))]
 
 
-def read_file(file: Path) -> tuple[Row, Row]:
-    """Text and solid of one file. ValueError: why it cannot be read."""
-    from tbcad_verify.step.kernel.reading import read_solid
-
-    return read_text(file), read_solid(file)
-
-
-def _answer(asked: Future[tuple[Row, Row]]) -> StepFile | Unknown:
+def _answer(asked: Future[StepFile]) -> StepFile | Unknown:
     """A file, or why it is not known."""
     try:
-        return parse(*asked.result())
+        return asked.result()
     except (ProcessEnded, ValueError) as error:
         return Unknown(str(error))
     except Exception as error:
         return Unknown(f"{type(error).__name__}: {error}")
 
 
-def read_text(path: Path) -> Row:
-    """Named faces with their spheres and planes, solids by name, and validation properties; mm.
+def read_file(file: Path) -> StepFile:
+    """One file: its names and claims by its text, its measures by the kernel, faces by both; mm.
 
-    ValueError: the text is no STEP file, or an entity lacks what its kind must have.
+    ValueError: why it cannot be read, as text or by the kernel.
     """
+    from tbcad_verify.step.kernel.reading import read_solid
+
     try:
         # Names are ASCII, and the standard writes all other characters so too.
-        table = StepTable(path.read_bytes().decode("ascii"))
+        table = StepTable(file.read_bytes().decode("ascii"))
         refuse_foreign(table)
-        return {
-            "solids": [table.label(one) for one in table.of("MANIFOLD_SOLID_BREP")],
-            "products": [table.label(one) for one in table.of("PRODUCT")],
-            "faces": [_text_face(table, one) for one in table.of("ADVANCED_FACE")],
-            "properties": _properties(table),
-        }
+        solids, products = (
+            tuple(table.label(one) for one in table.of(kind))
+            for kind in ("MANIFOLD_SOLID_BREP", "PRODUCT")
+        )
+        told = [_text_face(table, one) for one in table.of("ADVANCED_FACE")]
+        properties = _properties(table)
     except (LookupError, ValueError) as error:
         begin = "" if str(error).startswith(BROKEN) else f"{BROKEN}: "
         raise ValueError(f"{begin}{error}") from error
+    solid = read_solid(file)
+    area = sum(row["area"] for row in solid["faces"])
+    return StepFile(
+        solids,
+        products,
+        {key: solid[key] for key in ("solids", "shells", "open_edges")},
+        solid["valid"],
+        solid["gap"],
+        MassProperties(solid["volume"], area, solid["centroid"], *solid["box"]),
+        properties,
+        _faces(told, solid["faces"]),
+    )
 
 
 def _text_face(table: StepTable, face: int) -> Row:
@@ -161,10 +168,10 @@ def _text_face(table: StepTable, face: int) -> Row:
     if row["kind"] == "other":
         return row
     point, axis = table.placement(table.references(surface)[0])
-    row |= {"forward": table.forward(face), "point": point.tolist()}
+    row |= {"forward": table.forward(face), "point": point}
     if row["kind"] == "sphere":
         return row | {"radius": table.numbers(surface)[-1]}
-    return row | {"axis": axis.tolist()}
+    return row | {"axis": axis}
 
 
 def _properties(table: StepTable) -> Row:
@@ -192,19 +199,19 @@ def known(found: Found | Unknown) -> Found:
     return found
 
 
-def parse(text: Row, solid: Row) -> StepFile:
-    """Join the text's figures with the kernel's."""
-    rows = solid["faces"]
-    area = sum(row["area"] for row in rows)
-    return StepFile(
-        tuple(text["solids"]),
-        tuple(text["products"]),
-        {key: solid[key] for key in ("solids", "shells", "open_edges")},
-        solid["valid"],
-        solid["gap"],
-        MassProperties(solid["volume"], area, solid["centroid"], *solid["box"]),
-        text["properties"],
-        _faces(text["faces"], rows),
+def _faces(rows: list[Row], measured: list[Row]) -> StepFaces:
+    joined = _joined(rows, measured)
+    pairs = list(zip(joined, rows, strict=True))
+    return StepFaces(
+        tuple(row["name"] for row in rows),
+        np.array([row["kind"] for row in rows], dtype=str),
+        _vectors(rows, "point"),
+        np.array([row.get("radius", np.nan) for row in rows]),
+        _vectors(joined, "normal"),
+        np.array([_outward(*pair) for pair in pairs]),
+        np.array([_inward(*pair) for pair in pairs]),
+        np.array([row.get("area", np.nan) for row in joined]),
+        _vectors(joined, "centroid"),
     )
 
 
@@ -218,36 +225,19 @@ def _joined(rows: list[Row], measured: list[Row]) -> list[Row]:
         if mine and theirs:
             tree = cKDTree(np.nan_to_num([_numbers(measured[k]) for k in theirs]))
             found = tree.query(np.nan_to_num([_numbers(rows[k]) for k in mine]))
-            distance, nearest = (np.atleast_1d(one).tolist() for one in found)
-            for k, far, there in zip(mine, distance, nearest, strict=True):
+            for k, far, there in zip(mine, *found, strict=True):
                 joined[k] = measured[theirs[there]] if far <= SAME_SURFACE else {}
     return joined
 
 
 def _numbers(row: Row) -> list[float]:
-    return [*row.get("point", ()), *row.get("axis", ()), row.get("radius", 0.0)]
-
-
-def _faces(rows: list[Row], measured: list[Row]) -> StepFaces:
-    joined = _joined(rows, measured)
-    return StepFaces(
-        tuple(row["name"] for row in rows),
-        np.array([row["kind"] for row in rows], dtype=str),
-        _vectors(rows, "point"),
-        np.array([row.get("radius", np.nan) for row in rows]),
-        _vectors(joined, "normal"),
-        np.array([_outward(row, text) for row, text in zip(joined, rows, strict=True)]),
-        np.array([_inward(row, text) for row, text in zip(joined, rows, strict=True)]),
-        np.array([row.get("area", np.nan) for row in joined]),
-        _vectors(joined, "centroid"),
-    )
+    return [*row["point"], *row.get("axis", ()), row.get("radius", 0.0)]
 
 
 def _outward(row: Row, text: Row) -> bool:
     if row.get("kind") != "plane":
         return bool(row.get("outward") and text["forward"])
-    along = sum(a * b for a, b in zip(text["axis"], row["normal"], strict=True)) > 0
-    return bool(along == text["forward"])
+    return bool((np.dot(text["axis"], row["normal"]) > 0) == text["forward"])
 
 
 def _inward(row: Row, text: Row) -> bool:

@@ -94,10 +94,7 @@ def map_circles(maps: SurfaceMaps, number: Ints, others: Surfaces, spread: float
     square = size - 4 * alpha * gamma
     real = (square > COINCIDENT * (size + np.abs(alpha * gamma))) & ~same & ~same_cell
     covers = ~same_cell & np.where(same, earlier, ~real & (alpha * spread + gamma / spread < 0))
-    scale = 1 / np.sqrt(np.where(real, square, 1))
-    return _with_horizon(
-        MapCircles(alpha * scale, beta * scale, gamma * scale, real, covers), maps.reach
-    )
+    return _with_horizon(maps.reach, (alpha, beta, gamma), square, real, covers)
 
 
 def plane_circles(maps: SurfaceMaps, point: Floats, normal: Floats, real: Bools) -> MapCircles:
@@ -114,11 +111,7 @@ def plane_circles(maps: SurfaceMaps, point: Floats, normal: Floats, real: Bools)
     alpha, beta = k**2 / 4 * gamma - k * along[2] / 2, np.stack(along[:2])
     square = beta[0] ** 2 + beta[1] ** 2 - 4 * alpha * gamma
     cuts = real & (square > COINCIDENT)
-    scale = 1 / np.sqrt(np.where(cuts, square, 1))
-    covers = real & ~cuts & (gamma < 0)
-    return _with_horizon(
-        MapCircles(alpha * scale, beta * scale, gamma * scale, cuts, covers), maps.reach
-    )
+    return _with_horizon(maps.reach, (alpha, beta, gamma), square, cuts, real & ~cuts & (gamma < 0))
 
 
 def _forms(maps: SurfaceMaps, others: Surfaces) -> tuple[Floats, Floats, Floats]:
@@ -137,14 +130,20 @@ def _forms(maps: SurfaceMaps, others: Surfaces) -> tuple[Floats, Floats, Floats]
     return alpha, np.stack(along[:2]), gamma
 
 
-def _with_horizon(circles: MapCircles, reach: Floats) -> MapCircles:
-    """A last column: 1 - |y|^2 / reach^2 >= 0."""
-    edge = reach[:, None]
+def _with_horizon(
+    reach: Floats, form: tuple[Floats, Floats, Floats], square: Floats, real: Bools, covers: Bools
+) -> MapCircles:
+    """Circles of alpha, beta and gamma, scaled, and a last column: 1 - |y|^2 / reach^2 >= 0.
+
+    `square`: (M, K) |beta|^2 - 4 alpha gamma.
+    """
+    scale, edge = 1 / np.sqrt(np.where(real, square, 1)), reach[:, None]
+    alpha, beta, gamma = (values * scale for values in form)
     no = np.zeros_like(edge, dtype=bool)
     return MapCircles(
-        np.hstack([circles.alpha, -1 / (2 * edge)]),
-        np.concatenate([circles.beta, np.zeros((2, *edge.shape))], axis=2),
-        np.hstack([circles.gamma, edge / 2]),
-        np.hstack([circles.real, ~no]),
-        np.hstack([circles.covers, no]),
+        np.hstack([alpha, -1 / (2 * edge)]),
+        np.concatenate([beta, np.zeros((2, *edge.shape))], axis=2),
+        np.hstack([gamma, edge / 2]),
+        np.hstack([real, ~no]),
+        np.hstack([covers, no]),
     )
