@@ -55,10 +55,10 @@ def photograph(options: CaptureOptions) -> Photographs:
     options.check()
     exports, file = Path(options.exports), options.object_file
     check_is_export(exports)
-    check_is_object(None if file is None else Path(file), options.up, options.unit)
+    check_is_object(options.object_file, options.up, options.unit)
     from tbcad.light.simulate.camera_photographs import camera_photographs
     from tbcad.light.simulate.scene.lamps import lit_by, read_lamps
-    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
+    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
     from tbcad.light.simulate.scene.ray_casting import prepared_scene
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.output.folder import check_replaceable
@@ -70,7 +70,7 @@ def photograph(options: CaptureOptions) -> Photographs:
     options.progress("object and scene")
     export = read_export(exports)
     taken = ObjectOptions(options.fit, options.paint, options.up, options.unit)
-    subject = load_or_built_in(file, export.capture_mm, taken, options.answer)
+    subject = load_object(file, export.capture_mm, taken, options.answer)
     lamps = read_lamps(export.folder) if options.geometry == "prototype" else None
     subject = lit_by(lamps, subject) if lamps else subject
     cameras = camera_photographs(
@@ -189,20 +189,18 @@ def dataset(options: ExportOptions) -> dict[str, Any]:
     place, out, exports = Path(options.capture), Path(options.out), options.exports
     check_is_capture(place)
     from tbcad.light.datasets.export import write_dataset, write_scene
-    from tbcad.light.simulate.capture.files import OBJECT, read_object
+    from tbcad.light.simulate.capture.files import captured_scene
     from tbcad.light.simulate.capture.light_field import LightField
-    from tbcad.light.simulate.scene.ray_casting import prepared_scene
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
 
     inputs = (place if place.is_dir() else place.parent, exports)
     check_replaceable(out, "dataset", options.force, inputs)
-    known = (place / OBJECT).is_file()
     with (
         LightField.open(place) as source,
         replacing(out, "dataset", options.force, inputs) as folder,
     ):
-        scene = prepared_scene(read_object(place)) if known else None
+        scene = captured_scene(place)
         if exports is not None:
             record = write_scene(folder, source, scene, Path(exports), options.progress)
         else:

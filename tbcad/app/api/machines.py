@@ -58,7 +58,7 @@ def simulate_run(options: SimulateRunOptions) -> Run:
     """
     exports, folder, file = Path(options.exports), Path(options.out), options.object_file
     check_is_export(exports)
-    check_is_object(None if file is None else Path(file), options.up, options.unit)
+    check_is_object(options.object_file, options.up, options.unit)
     if options.bits not in (8, 16):
         raise InputError(f"--bits {options.bits} is not written: allowed is 8 or 16")
     options.stop_numbers()  # refused before what is heavy is loaded

@@ -89,14 +89,14 @@ def tolerance(options: ToleranceOptions) -> Analysis:
         InputError: export or process cannot be read, or mirrors are planar.
     """
     process, exports = checked_process(options), Path(options.exports)
-    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
+    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.tolerancing.analysis import analyse as analyse_export
 
     options.progress("record of the export")
     export = read_export(exports)
     taken = ObjectOptions(up=options.up, unit=options.unit)
-    subject = load_or_built_in(options.object_file, export.capture_mm, taken, options.answer)
+    subject = load_object(options.object_file, export.capture_mm, taken, options.answer)
     return analyse_export(export, process, subject, options)
 
 
@@ -112,8 +112,7 @@ def checked_process(options: ToleranceOptions) -> Process:
         raise InputError(f"--builds {options.builds}: allowed is {LEAST_BUILDS} to 1000000")
     check_yield(options.wanted_yield)
     check_is_export(Path(options.exports))
-    file = options.object_file
-    check_is_object(None if file is None else Path(file), options.up, options.unit)
+    check_is_object(options.object_file, options.up, options.unit)
     return process
 
 

@@ -11,7 +11,7 @@ from PIL import Image
 
 from tbcad.cad.formats.mesh_files import points_ply
 from tbcad.common.compiled import compiled_loop
-from tbcad.common.figure_files import png_bytes
+from tbcad.common.figure_files import image_bytes
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
 from tbcad.light.datasets.pictures import PinholePictures, pinhole_pictures
@@ -33,7 +33,7 @@ def depth_png(depth: Floats, capture_mm: float) -> bytes:
     """Depth (h, w) as a PNG of 16 bits: 1 at the capture sphere's back, 65535 at its front."""
     share = 0.5 - depth / capture_mm
     number = np.rint(1 + (FRONT - 1) * np.clip(share, 0, 1))
-    return png_bytes(np.nan_to_num(number).astype(np.uint16))
+    return image_bytes(np.nan_to_num(number).astype(np.uint16))
 
 
 def depth_points(view: Camera, depth: Floats) -> Floats:

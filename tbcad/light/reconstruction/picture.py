@@ -9,7 +9,7 @@ from threading import Lock
 import numpy as np
 from scipy import ndimage
 
-from tbcad.common.figure_files import png_bytes
+from tbcad.common.figure_files import image_bytes
 from tbcad.core.geometry.vectors import dot, unit
 from tbcad.core.optics.camera import Camera
 from tbcad.light.reconstruction.field import Field
@@ -120,12 +120,12 @@ def _gradient(lattice: Singles, at: Floats) -> Floats:
 def normals_png(normals: Floats) -> bytes:
     """Normals (h, w, 3) as a PNG: red, green, blue are 0.5 + 0.5 x, y, z; black: unknown."""
     shown = np.rint(255 * (0.5 + 0.5 * np.nan_to_num(normals, nan=-1.0)))
-    return png_bytes(shown.astype(np.uint8))
+    return image_bytes(shown.astype(np.uint8))
 
 
 def opacity_png(picture: FieldPicture) -> bytes:
     """The opacity as a PNG in grey: 0 nothing, 255 opaque."""
-    return png_bytes(np.rint(255 * np.clip(picture.opacity, 0, 1)).astype(np.uint8))
+    return image_bytes(np.rint(255 * np.clip(picture.opacity, 0, 1)).astype(np.uint8))
 
 
 def write_preview(file: Path, made: Field) -> None:

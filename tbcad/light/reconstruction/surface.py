@@ -26,6 +26,7 @@ from tbcad.light.reconstruction.marching import MATT, SOFTNESS, Singles, composi
 from tbcad.light.reconstruction.rays import CapturedRays
 from tbcad.light.reconstruction.start import NUMBERS
 from tbcad.light.simulate.parallel import first_then_threads, in_threads, over_chunks
+from tbcad.light.simulate.scene.lamps import free_rays
 from tbcad.light.simulate.scene.ray_casting import embree_scene
 from tbcad.types import Bools, Bytes, Floats, Ints
 
@@ -189,7 +190,8 @@ def _hidden(embree: Any, points: Singles) -> Bools:
         seen = np.zeros(len(place), dtype=np.int64)
         for toward in _hemisphere(4):
             left = np.flatnonzero(seen < SEEN_FROM)
-            seen[left] += _free(embree, place[left], toward)
+            ways = np.broadcast_to(toward, (len(left), 3))
+            seen[left] += free_rays(embree, place[left], ways)
         return np.asarray(seen < SEEN_FROM)
 
     return over_chunks(part, len(points), POINTS_PER_CHUNK)
@@ -200,14 +202,6 @@ def _hemisphere(n: int) -> Singles:
     directions = geodesic(n)[0].astype(np.float32)
     order = np.argsort(-directions[:, 2], kind="stable")
     return np.asarray(directions[order[directions[order, 2] > 0]])
-
-
-def _free(embree: Any, points: Singles, toward: Singles) -> Bools:
-    """From which points (n, 3) nothing is met in a direction."""
-    if len(points) == 0:
-        return np.zeros(0, dtype=bool)
-    direction = np.broadcast_to(toward, points.shape)
-    return np.asarray(embree.run(points, direction, query="OCCLUDED") != 0)
 
 
 def _bodies(points: Singles, faces: Ints, least: float) -> tuple[Singles, Ints]:
@@ -236,7 +230,7 @@ def _colours(made: Field, mesh: trimesh.Trimesh) -> Bytes:
     def seen(toward: Singles) -> tuple[Ints, Singles]:
         rows = np.flatnonzero(normals @ toward > FACING)
         begin = points[rows] + np.float32(OUTSIDE * pitch) * toward
-        free = _free(embree, begin, toward)
+        free = free_rays(embree, begin, np.broadcast_to(toward, begin.shape))
         length = np.full(int(free.sum()), (OUTSIDE + INSIDE) * pitch, dtype=np.float32)
         back = np.ascontiguousarray(np.broadcast_to(-toward, (len(length), 3)))
         return rows[free], composited(begin[free], back, length, medium)[:, :MATT]

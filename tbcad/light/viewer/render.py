@@ -4,16 +4,15 @@ from base64 import b64encode
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from io import BytesIO
 from itertools import count
 from pathlib import Path
 from threading import Lock
 from typing import Literal
 
 import numpy as np
-from PIL import Image
 
 from tbcad.common.atomic_files import replace_files
+from tbcad.common.figure_files import image_bytes
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
 from tbcad.light.datasets.pictures import pinhole_pictures
@@ -132,13 +131,6 @@ def capture_mm(pictured: MirrorTiles | Field) -> float:
     if isinstance(pictured, Field):
         return pictured.grid.width_mm
     return pictured.source.capture_mm
-
-
-def image_bytes(image: Bytes, kind: str, **options: int) -> bytes:
-    """An image (h, w, 3) as a file of a kind that Pillow writes."""
-    with BytesIO() as buffer:
-        Image.fromarray(np.ascontiguousarray(image)).save(buffer, kind, **options)
-        return buffer.getvalue()
 
 
 @dataclass(frozen=True)

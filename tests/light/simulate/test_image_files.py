@@ -12,7 +12,6 @@ from skimage.metrics import structural_similarity
 from tbcad.errors import InputError
 from tbcad.light.simulate.image_files import (
     ANIMATED_SUFFIXES,
-    check_image_path,
     difference,
     write_animation,
     write_images,
@@ -49,13 +48,6 @@ def test_animations_run_forward_and_back(tmp_path: Path, suffix: str) -> None:
 def test_difference_has_no_sign() -> None:
     assert (difference(RED, BLUE) == [255, 0, 255]).all()
     assert np.array_equal(difference(RED, BLUE), difference(BLUE, RED))
-
-
-@pytest.mark.parametrize("name", ["a.jpg", "absent/a.png", "folder.png"])
-def test_image_paths_refused(tmp_path: Path, name: str) -> None:
-    (tmp_path / "folder.png").mkdir()
-    with pytest.raises(InputError, match=name):
-        check_image_path(tmp_path / name)
 
 
 def test_failed_writing_leaves_the_old_file(tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ from tbcad.options.shared import (
     Distance,
     Elevation,
     ForceFile,
-    Fov,
     Height,
     OutPicture,
     Width,
@@ -30,15 +29,14 @@ if TYPE_CHECKING:
     from tbcad.light.simulate.scene.ray_casting import Scene
     from tbcad.types import Bytes
 
-WIDEST_DEG = 170
-
 
 def check_pictures(capture: Path, out: Path, force: bool, *inputs: Path | None) -> None:
     """Refuse, before any work, pictures that cannot be written, that exist, or that are read."""
+    from tbcad.light.simulate.capture.files import OBJECT
     from tbcad.light.simulate.image_files import check_image_path
     from tbcad.output.single_files import check_file
 
-    compared = compared_files(out) if has_object(capture) else []
+    compared = compared_files(out) if (capture / OBJECT).is_file() else []
     for file in (out, *compared):
         check_image_path(file, force)
         check_file(file, force, (capture, *inputs))
@@ -49,44 +47,20 @@ def compared_files(out: Path) -> list[Path]:
     return [out.with_name(f"{out.stem}-{what}{out.suffix}") for what in ("truth", "and-truth")]
 
 
-def has_object(capture: Path) -> bool:
-    """Whether a capture is simulated: real photographs come without the object."""
-    from tbcad.light.simulate.capture.files import OBJECT
-
-    return (capture / OBJECT).is_file()
-
-
 def viewpoint_of(
-    source: "LightField",
-    place: tuple[float, float, float],
-    size: tuple[int, int],
-    fov: float | None,
+    source: "LightField", place: tuple[float, float, float], size: tuple[int, int]
 ) -> "Camera":
     """The camera of a view: azimuth and elevation in degrees, distance in mm; columns and rows.
 
-    InputError: no light field shows what it would see, or its angle of view cannot be.
+    InputError: no light field shows what it would see.
     """
     from math import radians
 
     from tbcad.light.simulate.scene.rays import camera_around_object
 
     azimuth, elevation, distance = place
-    if fov is not None and not 0 < fov < WIDEST_DEG:
-        raise InputError(f"--fov {fov:g} is no angle of view: allowed is above 0, below 170")
-    wide = None if fov is None else radians(fov)
-    return camera_around_object(
-        radians(azimuth), radians(elevation), distance, source.capture_mm, size, wide
-    )
-
-
-def scene_of(folder: Path) -> "Scene | None":
-    """The object of a simulated capture; None where there is none, as with real photographs."""
-    from tbcad.light.simulate.capture.files import read_object
-    from tbcad.light.simulate.scene.ray_casting import prepared_scene
-
-    if not has_object(folder):
-        return None
-    return prepared_scene(read_object(folder))
+    angles = radians(azimuth), radians(elevation)
+    return camera_around_object(*angles, distance, source.capture_mm, size)
 
 
 def true_picture(scene: "Scene", at: "Camera", samples: int = 4) -> "Bytes":
@@ -191,7 +165,6 @@ def refocus(
     ] = 21,
     width: Width = 640,
     height: Height = 480,
-    fov: Fov = None,
     truth_samples: Annotated[
         int, typer.Option(min=1, max=100_000, help="Rays per pixel of the ray-traced lens.")
     ] = 256,
@@ -206,6 +179,7 @@ def refocus(
     if all_in_focus and sweep is not None:
         raise InputError("--all-in-focus has no focus to move: leave out --sweep")
     from tbcad.app.api.views import refocused
+    from tbcad.light.simulate.capture.files import captured_scene
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.capture.photograph import to_bytes
     from tbcad.light.simulate.image_files import (
@@ -226,10 +200,10 @@ def refocus(
     names = ("69 pinholes", "pinhole" if all_in_focus else "real lens")
     with stages(3 + (sweep is not None)) as screen, LightField.open(capture_folder) as source:
         screen.stage("light field")
-        at = viewpoint_of(source, (azimuth, elevation, distance), (width, height), fov)
+        at = viewpoint_of(source, (azimuth, elevation, distance), (width, height))
         lens = ThinLens(aperture, focus)
         lens.check(at, source.capture_mm)
-        tiles, scene = MirrorTiles(source), scene_of(capture_folder)
+        tiles, scene = MirrorTiles(source), captured_scene(capture_folder)
         screen.stage(names[0])
         picture = refocused(tiles, at, lens, all_in_focus, screen.detail).image
         screen.stage(names[1])

@@ -13,7 +13,6 @@ from tbcad.app.cli.commands.refocus import (
     check_beside,
     check_pictures,
     field_view,
-    scene_of,
     true_picture,
     viewpoint_of,
     write_beside,
@@ -29,7 +28,6 @@ from tbcad.options.shared import (
     Distance,
     Elevation,
     ForceFile,
-    Fov,
     Height,
     MethodOfView,
     OutPicture,
@@ -92,7 +90,6 @@ def view(
     frame: FrameOption = None,
     width: Width = 640,
     height: Height = 480,
-    fov: Fov = None,
     force: ForceFile = False,
 ) -> int:
     """Synthesise the view of a camera anywhere around the object from a light field.
@@ -109,6 +106,7 @@ def view(
     chosen = asked or "depth"
     from tbcad.light.reconstruction.field import wanted_field
     from tbcad.light.reflectance.environment import read_environment
+    from tbcad.light.simulate.capture.files import captured_scene
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.capture.sequence import sequence_frame
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
@@ -123,8 +121,8 @@ def view(
     with stages(3) as screen, LightField.open(capture_folder) as stored:
         screen.stage("light field")
         source = stored if frame is None else sequence_frame(stored, capture_folder, frame)
-        at = viewpoint_of(source, (azimuth, elevation, distance), (width, height), fov)
-        scene, tiles = scene_of(capture_folder), MirrorTiles(source)
+        at = viewpoint_of(source, (azimuth, elevation, distance), (width, height))
+        scene, tiles = captured_scene(capture_folder), MirrorTiles(source)
         relit = None if wanted is None else _relit(capture_folder, source, wanted)
         shown = tiles if relit is None else MirrorTiles(relit.field)
         made = wanted_field(asked if by_default else chosen, capture_folder, source, frame)
