@@ -171,11 +171,8 @@ def merge(options: MergeOptions) -> dict[str, Any]:
 def as_built(options: AsBuiltOptions) -> dict[str, Any]:
     """Write the balls of a calibrated prototype as exact solids, coloured by their errors.
 
-    Returns:
-        What is in as_built.json.
-
-    Raises:
-        InputError: a file cannot be read, they do not belong together, or out cannot be replaced.
+    Returns what is in as_built.json. InputError: a file cannot be read, they do not belong
+    together, or out cannot be replaced.
     """
     known, out = Path(options.calibration), Path(options.out)
     check_is_calibration(known)

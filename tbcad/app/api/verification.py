@@ -61,13 +61,7 @@ def verify_as_built(
 ) -> AsBuiltReport:
     """Verify the prototype of a build as a calibration found it: coverage, and what to shim.
 
-    Args:
-        exports: folder that `build` wrote.
-        calibration: folder that `tbcad calibrate` wrote.
-        progress: called with the name of each stage.
-
-    Raises:
-        InputError: one cannot be read, or they do not belong together. Nothing is written.
+    InputError: one cannot be read, or they do not belong together. Nothing is written.
     """
     from tbcad_verify.as_built.verify import verify_as_built as verify_machine
     from tbcad_verify.errors import BadExport
@@ -118,18 +112,12 @@ def checked_process(options: ToleranceOptions) -> Process:
 
 @keywords(OrderOptions)
 def order(options: OrderOptions) -> dict[str, Any]:
-    """Write what a workshop needs to make the shells of a build by a process chain.
+    """Write what a workshop needs to make the shells of a build by a process chain; order.json.
 
     By how much each mirror may be off and what the chain holds of it: tables, STEP with tolerances,
-    and a page that says the rest.
-
-    Returns:
-        What is in order.json.
-
-    Raises:
-        InputError: the export has no shells, or no mandrels that the chain needs, their mirrors are
-            planar or may not be off at all, the chain cannot be read, the share is not between 0
-            and 1, or out cannot be replaced.
+    and a page that says the rest. InputError: the export has no shells, or no mandrels that the
+    chain needs, their mirrors are planar or may not be off at all, the chain cannot be read, the
+    share is not between 0 and 1, or out cannot be replaced.
     """
     exports, out = Path(options.exports), Path(options.out)
     check_is_export(exports)

@@ -27,13 +27,7 @@ class Views:
     >>> pictures = [views.view(azimuth, 30).image for azimuth in range(0, 360, 4)]
     """
 
-    def __init__(
-        self,
-        source: LightField | Field | Path | str,
-        *,
-        quick: bool = False,
-        progress: Progress = silent,
-    ) -> None:
+    def __init__(self, source: LightField | Field | Path | str, *, quick: bool = False) -> None:
         """Read nothing yet.
 
         Args:
@@ -41,10 +35,9 @@ class Views:
                 of a capture, which is shown by the field in it, if there is one.
             quick: look for the depth of a light field on fewer planes and at fewer points: a sixth
                 of the time.
-            progress: called with the state of what is made once.
         """
         self._source = Path(source) if isinstance(source, str) else source
-        self._quick, self._progress = quick, progress
+        self._quick = quick
 
     @cached_property
     def light_field(self) -> LightField:
@@ -83,7 +76,7 @@ class Views:
         from tbcad.light.depth.depth_map import depth_views
         from tbcad.light.depth.plane_sweep import FINE, QUICK
 
-        return depth_views(self.tiles, QUICK if self._quick else FINE, self._progress)
+        return depth_views(self.tiles, QUICK if self._quick else FINE)
 
     def view(
         self,

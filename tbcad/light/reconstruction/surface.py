@@ -30,7 +30,6 @@ from tbcad.light.simulate.scene.lamps import free_rays
 from tbcad.light.simulate.scene.ray_casting import embree_scene
 from tbcad.types import Bools, Bytes, Floats, Ints
 
-LEVELS = (0.01, 6.0)  # 1/mm, that may be asked for
 TRIED = np.geomspace(0.08, 5.12, 19)  # 1/mm: three to a factor of two
 MOST_TRIED = 100_000  # held rays
 OFF_NODES = 2e-3  # of the number: points so near to a node would be points of no distance
@@ -53,11 +52,9 @@ def best_level(made: Field, rays: CapturedRays, held: Bools) -> float:
     Of all levels it is the one where fewest rays see the background though they meet the surface,
     or something though they miss it. Rays that do so at any level, as those of black things, do not
     matter. The place where rays become half opaque is no measure: it lies behind the surface.
-    InputError: no ray is held out, or the field is empty.
+    InputError: the field is empty.
     """
     which = np.flatnonzero(held)
-    if len(which) == 0:
-        raise InputError("no ray is held out, so none tells the level of the surface: give one")
     which = which[:: -(-len(which) // MOST_TRIED)]
     bright = rays.colour[which].max(axis=1) >= rays.dark_level()
     lattice, corner = _lattice(made)
@@ -86,14 +83,9 @@ def field_mesh(made: Field, level: float, least_mm: float | None = None) -> trim
     """The surface of a level, 1/mm, as a closed mesh with colours (sRGB) at its points, mm.
 
     Bodies below a size of least_mm go; None: three distances of nodes, about what a mirror resolves
-    (`resolved_mm`): what lies within one pixel of each view may be noise as well. InputError: there
-    is no such level, or nothing is as dense.
+    (`resolved_mm`): what lies within one pixel of each view may be noise as well. InputError:
+    nothing is as dense.
     """
-    if not LEVELS[0] <= level <= LEVELS[1]:
-        raise InputError(
-            f"level {level:g} is no density of a surface: allowed is {LEVELS[0]:g} to "
-            f"{LEVELS[1]:g} 1/mm"
-        )
     pitch, number = made.grid.pitch_mm, _number(level)
     lattice, corner = _lattice(made)
     thin = _contour(lattice, corner, pitch, number)

@@ -71,11 +71,6 @@ def test_colours_are_those_of_the_field(mesh: trimesh.Trimesh, suffix: str, tmp_
     assert read.albedo.reshape(-1, 3).mean(axis=0) == pytest.approx(COLOUR, abs=0.01)
 
 
-def test_another_suffix_is_refused(mesh: trimesh.Trimesh) -> None:
-    with pytest.raises(InputError, match=r"'\.obj' is no kind of mesh file: allowed are \.glb"):
-        mesh_file(mesh, ".obj")
-
-
 def some_of_it() -> Field:
     """A ball's upper half."""
     whole = ball()

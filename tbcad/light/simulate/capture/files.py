@@ -174,10 +174,8 @@ def write_object(path: Path, subject: SceneObject) -> None:
 
 
 def read_object(folder: Path) -> SceneObject:
-    """Read the object of a capture; InputError: there is none, or it is damaged."""
+    """Read the object of a capture, which is there; InputError: it is damaged."""
     path = folder / OBJECT
-    if not path.is_file():
-        raise InputError(f"{path} is not there: without it there is no ground truth")
     try:
         with zipfile.ZipFile(path) as packed:
             if sum(entry.file_size for entry in packed.infolist()) > MAX_OBJECT_BYTES:
