@@ -93,15 +93,13 @@ class Views:
             InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the
                 object; a method is named for a field.
         """
-        from math import radians
-
         from tbcad.light.reconstruction.field import Field
-        from tbcad.light.simulate.scene.rays import camera_around_object
+        from tbcad.light.viewer.page import Query
 
         made = self._field if method is None or isinstance(self._source, Field) else None
-        angles = radians(azimuth_deg), radians(elevation_deg)
         capture_mm = self.light_field.capture_mm if made is None else made.grid.width_mm
-        camera = camera_around_object(*angles, distance_mm, capture_mm, size)
+        view = Query(azimuth_deg, elevation_deg, distance_mm, width=size[0], height=size[1])
+        camera = view.camera(capture_mm)
         if made is None:
             from tbcad.light.simulate.views.synthesis import synthesise
 
@@ -195,15 +193,13 @@ def refocus(
         InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object;
             there is no such lens, or its focus is far from the object.
     """
-    from math import radians
-
-    from tbcad.light.simulate.scene.rays import camera_around_object
     from tbcad.light.simulate.views.refocus import ThinLens
+    from tbcad.light.viewer.page import Query
 
     views = Views(source)
-    angles = (radians(azimuth_deg), radians(elevation_deg))
     capture_mm = views.light_field.capture_mm
-    at = camera_around_object(*angles, distance_mm, capture_mm, size)
+    view = Query(azimuth_deg, elevation_deg, distance_mm, width=size[0], height=size[1])
+    at = view.camera(capture_mm)
     lens = ThinLens(aperture_mm, focus_mm)
     lens.check(at, capture_mm)
     return refocused(views.tiles, at, lens, all_in_focus)

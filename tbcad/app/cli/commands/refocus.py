@@ -1,4 +1,4 @@
-"""Refocus a light field; the viewpoint, ground truth and files of all pictures from one."""
+"""Refocus a light field; the ground truth and files of all pictures from one."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -25,7 +25,6 @@ from tbcad.options.shared import (
 if TYPE_CHECKING:
     from tbcad.core.optics.camera import Camera
     from tbcad.light.reconstruction.field import Field
-    from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.scene.ray_casting import Scene
     from tbcad.types import Bytes
 
@@ -45,22 +44,6 @@ def check_pictures(capture: Path, out: Path, force: bool, *inputs: Path | None) 
 def compared_files(out: Path) -> list[Path]:
     """The ground truth and the comparison that are written beside a picture."""
     return [out.with_name(f"{out.stem}-{what}{out.suffix}") for what in ("truth", "and-truth")]
-
-
-def viewpoint_of(
-    source: "LightField", place: tuple[float, float, float], size: tuple[int, int]
-) -> "Camera":
-    """The camera of a view: azimuth and elevation in degrees, distance in mm; columns and rows.
-
-    InputError: no light field shows what it would see.
-    """
-    from math import radians
-
-    from tbcad.light.simulate.scene.rays import camera_around_object
-
-    azimuth, elevation, distance = place
-    angles = radians(azimuth), radians(elevation)
-    return camera_around_object(*angles, distance, source.capture_mm, size)
 
 
 def true_picture(scene: "Scene", at: "Camera", samples: int = 4) -> "Bytes":
@@ -189,6 +172,7 @@ def refocus(
     )
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.light.simulate.views.refocus import ThinLens, lens_picture, refocus_sweep
+    from tbcad.light.viewer.page import Query
     from tbcad.output.single_files import check_file
 
     check_pictures(capture_folder, out, force)
@@ -197,10 +181,11 @@ def refocus(
         check_file(sweep, force, (capture_folder,))
         if sweep in (out, *compared_files(out)):
             raise InputError(f"--sweep {sweep}: a picture of this command: choose another name")
+    place = Query(azimuth, elevation, distance, width=width, height=height)
     names = ("69 pinholes", "pinhole" if all_in_focus else "real lens")
     with stages(3 + (sweep is not None)) as screen, LightField.open(capture_folder) as source:
         screen.stage("light field")
-        at = viewpoint_of(source, (azimuth, elevation, distance), (width, height))
+        at = place.camera(source.capture_mm)
         lens = ThinLens(aperture, focus)
         lens.check(at, source.capture_mm)
         tiles, scene = MirrorTiles(source), captured_scene(capture_folder)

@@ -14,7 +14,6 @@ from tbcad.app.cli.commands.refocus import (
     check_pictures,
     field_view,
     true_picture,
-    viewpoint_of,
     write_beside,
     write_compared,
 )
@@ -111,17 +110,19 @@ def view(
     from tbcad.light.simulate.capture.sequence import sequence_frame
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.light.simulate.views.viewpoints import image_quality
+    from tbcad.light.viewer.page import Query
 
     check_pictures(capture_folder, out, force, light)
     check_beside(beside, out, chosen, force, (capture_folder, light))
     _check_light(light, light_turn, light_format, chosen)
     if frame is not None and light is not None:
         raise InputError("--frame has its own light: leave out --light")
+    place = Query(azimuth, elevation, distance, width=width, height=height)
     wanted = None if light is None else read_environment(light, radians(light_turn), light_format)
     with stages(3) as screen, LightField.open(capture_folder) as stored:
         screen.stage("light field")
         source = stored if frame is None else sequence_frame(stored, capture_folder, frame)
-        at = viewpoint_of(source, (azimuth, elevation, distance), (width, height))
+        at = place.camera(source.capture_mm)
         scene, tiles = captured_scene(capture_folder), MirrorTiles(source)
         relit = None if wanted is None else _relit(capture_folder, source, wanted)
         shown = tiles if relit is None else MirrorTiles(relit.field)

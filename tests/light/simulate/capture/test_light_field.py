@@ -28,16 +28,13 @@ FRAMES, TURN_DEG = 4, 120.0
 SMALL = ["--width", "96", "--height", "72"]
 
 
-def write_light_field(path: Path, cameras: Cameras, scene: Scene) -> Path:
-    with create_light_field(path, 60.0, {"object": "knot"}) as store:
-        for at in cameras:
-            write_camera(store, at, photograph(at.camera, exact_tracer(at), scene))
-    return path
-
-
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory, cameras: Cameras, knot: Scene) -> Path:
-    return write_light_field(tmp_path_factory.mktemp("field") / "lightfield.h5", cameras, knot)
+    path = tmp_path_factory.mktemp("field") / "lightfield.h5"
+    with create_light_field(path, 60.0, {"object": "knot"}) as store:
+        for at in cameras:
+            write_camera(store, at, photograph(at.camera, exact_tracer(at), knot))
+    return path
 
 
 def test_round_trip(file: Path, cameras: Cameras, light_field: LightField) -> None:
@@ -58,11 +55,7 @@ def test_round_trip(file: Path, cameras: Cameras, light_field: LightField) -> No
             assert np.array_equal(frame.mirrors.curvature, at.mirrors.curvature)
 
 
-def test_compressed_and_the_same_each_time(
-    file: Path, tmp_path: Path, cameras: Cameras, knot: Scene
-) -> None:
-    again = write_light_field(tmp_path / "again.h5", cameras, knot)
-    assert again.read_bytes() == file.read_bytes()
+def test_it_is_compressed(file: Path) -> None:
     raw = sum(np.dtype(kind).itemsize * int(np.prod(last)) for last, kind in PIXEL_ARRAYS.values())
     assert file.stat().st_size < 0.8 * 2 * 416 * 310 * raw
 
