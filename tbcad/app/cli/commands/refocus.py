@@ -1,8 +1,7 @@
 """Refocus a light field; the ground truth and files of all pictures from one."""
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -24,7 +23,6 @@ from tbcad.options.shared import (
 
 if TYPE_CHECKING:
     from tbcad.core.optics.camera import Camera
-    from tbcad.light.reconstruction.field import Field
     from tbcad.light.simulate.scene.ray_casting import Scene
     from tbcad.types import Bytes
 
@@ -72,55 +70,6 @@ def write_compared(
     write_images({out: picture, files[0]: truth, files[1]: sheet})
     typer.echo(image_quality(truth, picture).words(names[1]))
     typer.echo(f"{out}, {files[0].name}, {files[1].name}: written")
-
-
-Beside: TypeAlias = Sequence[tuple[str, Path]]
-"""Files beside a picture, each with what it shows and its option is called: depth, normals ..."""
-
-
-def check_beside(
-    beside: Beside, out: Path, method: str, force: bool, inputs: tuple[Path | None, ...]
-) -> None:
-    """Refuse, before any work, what cannot be written or what a method does not give."""
-    from tbcad.light.simulate.image_files import check_image_path
-    from tbcad.output.single_files import check_file
-
-    taken = [out, *compared_files(out)]
-    for what, file in beside:
-        if what == "depth" and method not in ("depth", "field"):
-            raise InputError(f"--depth {file}: no depth is looked for: add --method depth")
-        if what != "depth" and method != "field":
-            raise InputError(f"--{what} {file}: only a field has that: add --method field")
-        check_image_path(file, force, (".png", ".ply") if what == "depth" else (".png",))
-        check_file(file, force, inputs)
-        if file in taken:
-            raise InputError(f"--{what} {file}: another file of this command: choose another name")
-        taken.append(file)
-
-
-def write_beside(beside: Beside, contents: dict[str, Callable[[], bytes]]) -> None:
-    """Write files by what makes each: by what it shows, with the suffix."""
-    from tbcad.common.atomic_files import replace_files
-
-    for what, file in beside:
-        replace_files(file.parent, {file.name: contents[what + file.suffix.lower()]()})
-
-
-def field_view(made: "Field", at: "Camera", beside: Beside) -> "Bytes":
-    """The picture of a field (h, w, 3), and what else is asked for of it."""
-    from tbcad.light.depth.depth_map import depth_ply, depth_png
-    from tbcad.light.reconstruction import picture as pictures
-
-    picture = pictures.field_picture(made, at)
-    depth = picture.depth(at)
-    contents: dict[str, Callable[[], bytes]] = {
-        "depth.png": lambda: depth_png(depth, made.grid.width_mm),
-        "depth.ply": lambda: depth_ply(at, depth, picture.image),
-        "normals.png": lambda: pictures.normals_png(pictures.field_normals(made, at, picture)),
-        "opacity.png": lambda: pictures.opacity_png(picture),
-    }
-    write_beside(beside, contents)
-    return picture.image
 
 
 FocusOption = Annotated[float, typer.Option()]
