@@ -8,33 +8,15 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from tbcad.common.atomic_files import refuse_existing, replace_files
+from tbcad.common.atomic_files import replace_files
 from tbcad.common.figure_files import image_bytes
-from tbcad.errors import InputError
 from tbcad.types import Bytes
 
-STILL_SUFFIXES = (".png",)
 ANIMATED_SUFFIXES = (".gif", ".webp", ".png")
 LABEL_PX = 22
 GAP_PX = 4
 FRAME_MS = 120
 quick_png = partial(image_bytes, compress_level=3)
-
-
-def check_image_path(
-    file: Path, force: bool = False, suffixes: Sequence[str] = STILL_SUFFIXES
-) -> None:
-    """Refuse a file that could not be written, before long work.
-
-    InputError: another kind of file, its folder does not exist, or the file exists.
-    """
-    if file.suffix.lower() not in suffixes:
-        raise InputError(f"{file}: name a file that ends in {' or '.join(suffixes)}")
-    if not file.parent.is_dir():
-        raise InputError(f"{file}: its folder does not exist: make it, or choose another")
-    if file.is_dir():
-        raise InputError(f"{file} is a folder: choose another name")
-    refuse_existing(file, force)
 
 
 def write_images(images: Mapping[Path, Bytes]) -> None:

@@ -39,12 +39,13 @@ def fits(text: str) -> list[str]:
     return lines
 
 
-def test_outputs_of_verify(tmp_path: Path, cli: Command) -> None:
-    folder = shutil.copytree(SAMPLE, tmp_path / "x")
-    quiet = cli("verify", folder, "--quiet")
+def test_outputs_of_verify(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Command) -> None:
+    shutil.copytree(SAMPLE, tmp_path / "x")
+    monkeypatch.chdir(tmp_path)
+    quiet = cli("verify", "x", "--quiet")
     assert quiet.err == ""
     assert quiet.out == "PASS: as designed, 89 virtual cameras see 20 mm or more\n"
-    full = cli("verify", folder, "--full").out
+    full = cli("verify", "x", "--full").out
     assert quiet.out in full
     assert "object clearance" in "\n".join(fits(full))
     assert "parts can be made" in full

@@ -30,13 +30,11 @@ if TYPE_CHECKING:
 def check_pictures(capture: Path, out: Path, force: bool, *inputs: Path | None) -> None:
     """Refuse, before any work, pictures that cannot be written, that exist, or that are read."""
     from tbcad.light.simulate.capture.files import OBJECT
-    from tbcad.light.simulate.image_files import check_image_path
     from tbcad.output.single_files import check_file
 
     compared = compared_files(out) if (capture / OBJECT).is_file() else []
     for file in (out, *compared):
-        check_image_path(file, force)
-        check_file(file, force, (capture, *inputs))
+        check_file(file, force, (capture, *inputs), (".png",))
 
 
 def compared_files(out: Path) -> list[Path]:
@@ -114,11 +112,7 @@ def refocus(
     from tbcad.light.simulate.capture.files import captured_scene
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.capture.photograph import to_bytes
-    from tbcad.light.simulate.image_files import (
-        ANIMATED_SUFFIXES,
-        check_image_path,
-        write_animation,
-    )
+    from tbcad.light.simulate.image_files import ANIMATED_SUFFIXES, write_animation
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.light.simulate.views.refocus import ThinLens, lens_picture, refocus_sweep
     from tbcad.light.viewer.page import Query
@@ -126,8 +120,7 @@ def refocus(
 
     check_pictures(capture_folder, out, force)
     if sweep is not None:
-        check_image_path(sweep, force, ANIMATED_SUFFIXES)
-        check_file(sweep, force, (capture_folder,))
+        check_file(sweep, force, (capture_folder,), ANIMATED_SUFFIXES)
         if sweep in (out, *compared_files(out)):
             raise InputError(f"--sweep {sweep}: a picture of this command: choose another name")
     place = Query(azimuth, elevation, distance, width=width, height=height)

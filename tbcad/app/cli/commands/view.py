@@ -203,7 +203,6 @@ def _check_beside(
 
     Each file beside the picture comes with what it shows, as its option is called: depth ...
     """
-    from tbcad.light.simulate.image_files import check_image_path
     from tbcad.output.single_files import check_file
 
     taken = [out, *compared_files(out)]
@@ -212,8 +211,7 @@ def _check_beside(
             raise InputError(f"--depth {file}: no depth is looked for: add --method depth")
         if what != "depth" and method != "field":
             raise InputError(f"--{what} {file}: only a field has that: add --method field")
-        check_image_path(file, force, (".png", ".ply") if what == "depth" else (".png",))
-        check_file(file, force, inputs)
+        check_file(file, force, inputs, (".png", ".ply") if what == "depth" else (".png",))
         if file in taken:
             raise InputError(f"--{what} {file}: another file of this command: choose another name")
         taken.append(file)

@@ -21,6 +21,7 @@ from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays, prepared_sc
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.studies.low_pass import defocus_shifts, low_pass_shifts
+from tests.app.cli.commands import Command
 from tests.light.viewer.fields import write_ball
 
 Cameras = tuple[Reflector, Reflector]
@@ -141,17 +142,14 @@ def test_damaged_sequences_are_refused(captured: Path, tmp_path: Path) -> None:
             sequence_frame(source, tmp_path, 0)
 
 
-def test_a_frame_is_shown_by_its_own_field(
-    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_frame_is_shown_by_its_own_field(captured: Path, tmp_path: Path, cli: Command) -> None:
     folder = tmp_path / "turning"
     shutil.copytree(captured, folder)
     with LightField.open(folder) as source:
         write_ball(sequence_frame(source, folder, 1), folder, frame=1)
     for number, method in (("0", "depth"), ("1", "field")):
-        words = ["view", str(folder), *SMALL, "--frame", number, "--force"]
-        assert run([*words, "--out", str(tmp_path / "v.png")]) == 0
-        assert f"method {method}: " in capsys.readouterr().out
+        words = ["view", folder, *SMALL, "--frame", number, "--force"]
+        assert f"method {method}: " in cli(*words, "--out", tmp_path / "v.png").out
 
 
 def picture(
