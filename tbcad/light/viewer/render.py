@@ -7,7 +7,6 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 from threading import Lock
-from typing import Literal
 
 import numpy as np
 
@@ -29,7 +28,6 @@ from tbcad.light.viewer.page import Query, filled
 from tbcad.output.single_files import check_file
 from tbcad.types import Bytes, Progress
 
-MethodAtRest = Literal["nearest", "depth"]
 View = Callable[[Camera], Bytes]  # what makes the picture (h, w, 3) of a camera
 JPEG_QUALITY = 88
 # While the view moves, a lens has 9 pinholes instead of 69, at half the width and height.
@@ -99,7 +97,7 @@ class Renderer:
 
 
 def light_field_renderer(
-    tiles: MirrorTiles, method: MethodAtRest = "depth", progress: Progress = lambda _: None
+    tiles: MirrorTiles, method: str = "depth", progress: Progress = lambda _: None
 ) -> Renderer:
     """Of a light field, whose file stays open: makes the pictures of all its virtual cameras."""
     pictures, reach = pinhole_pictures(tiles.source, progress), tiles.source.capture_mm
@@ -117,9 +115,7 @@ def _of_field(made: Field, view: Camera, stride: float = STRIDE) -> Bytes:
     return field_picture(made, view, stride).image
 
 
-def _synthesised(
-    tiles: MirrorTiles, method: MethodAtRest, by_depth: Callable[[], DepthViews]
-) -> View:
+def _synthesised(tiles: MirrorTiles, method: str, by_depth: Callable[[], DepthViews]) -> View:
     if method == "depth":
         views = by_depth()
         return lambda view: views.of(view)[0].image
@@ -141,7 +137,7 @@ class Turntable:
     elevations_deg: tuple[float, ...]  # a row of views each
     distance: float  # of the camera from the middle of the object, mm
     size: tuple[int, int]  # columns and rows of a picture
-    method: MethodAtRest  # how those of a light field are made
+    method: str  # how they are made: nearest or depth, of a light field, or field
 
 
 def even_elevations(rows: int, middle_deg: float) -> tuple[float, ...]:
