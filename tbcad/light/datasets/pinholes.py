@@ -218,7 +218,8 @@ def seed_points(
 
     Cameras (m,), what they see (m, h, w, 3), and where that is known (m, h, w).
     """
-    points = _candidates(capture_mm / 2)
+    points = capture_mm * (qmc.Halton(3, scramble=False).random(CANDIDATES) - 0.5)
+    points = points[norm(points) < capture_mm / 2]
     step = -(-len(cameras) // MOST_CAMERAS)
     some = zip(cameras[::step], pictures[::step], masks[::step], strict=True)
     seen = [_colours(camera, picture, mask, points) for camera, picture, mask in some]
@@ -230,12 +231,6 @@ def seed_points(
     values = np.where(known[:, kept, None], colours[:, kept].astype(np.float32), np.nan)
     median = np.nanmedian(values, axis=0)
     return SeedPoints(points[kept], np.rint(median).astype(np.uint8))
-
-
-def _candidates(radius: float) -> Floats:
-    cube = qmc.Halton(3, scramble=False).random(CANDIDATES)
-    points = radius * (2 * cube - 1)
-    return np.asarray(points[norm(points) < radius])
 
 
 def _colours(camera: Camera, picture: Bytes, mask: Bools, points: Floats) -> tuple[Bytes, Bools]:

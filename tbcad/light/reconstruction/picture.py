@@ -96,16 +96,12 @@ def field_normals(made: Field, view: Camera, picture: FieldPicture) -> Floats:
     opaque = ndimage.gaussian_filter(opaque, SMOOTHED)
     normal = -direction
     for _ in range(2):
-        normal = _toward(normal, -_gradient(opaque, at + BEFORE * normal), direction)
+        found = -_gradient(opaque, at + BEFORE * normal)
+        side = -np.sign(dot(found, direction))[:, None]  # against the rays; 0: there is none
+        normal = np.where(side != 0, side * unit(found), normal)
     result = np.full((*known.shape, 3), np.nan)
     result[known] = normal
     return result
-
-
-def _toward(before: Floats, found: Floats, direction: Floats) -> Floats:
-    """Unit vectors (k, 3) along those found, against the rays; where there are none, as before."""
-    side = -np.sign(dot(found, direction))[:, None]
-    return np.where(side != 0, side * unit(found), before)
 
 
 def _gradient(lattice: Singles, at: Floats) -> Floats:

@@ -34,12 +34,10 @@ from tbcad.types import Floats
 MIRRORS = "mirrors"
 COLUMNS = ("x_mm", "y_mm", "z_mm")
 MAX_MM = 1e9
-# Both halves of a mirror on the seam have one virtual camera.
-ON_SEAM = 1e-9
 PROJECTORS = "projectors"
 # A plane is taken as a sphere so large that it differs by 1e-5 mm over a cell.
 LEAST_CURVATURE = 1e-7
-# Both halves of a mirror on the seam have one direction.
+# Both halves of a mirror on the seam have one direction, and one virtual camera.
 SAME_DIRECTION = 1e-9
 STEPS = 20  # of the search for a point of reflection; each gains a digit or so
 
@@ -77,18 +75,14 @@ def lamps_of_mirrors(source: LightField, every: int) -> LampPlaces:
 
     InputError: no mirror gives a virtual camera.
     """
-    mirrors = [one for one in chosen_mirrors(source, None, 1) if not _second_half(source, one)]
+    both = [_halves(source, one) for one in chosen_mirrors(source, None, 1)]
+    mirrors = [one for one, *others in both if one.frame == "a" or not others]
     u = np.array([source.frames[one.frame].u[one.index] for one in mirrors])
     kept = spread_evenly(u, -(-len(mirrors) // every))
     virtual = virtual_cameras(source, [mirrors[k] for k in kept])
     if not len(virtual):
         raise InputError("no mirror of the capture gives a virtual camera: give lamps as a table")
     return LampPlaces(tuple(one.name for one in virtual.mirrors), virtual.centre)
-
-
-def _second_half(source: LightField, mirror: MirrorId) -> bool:
-    on_seam = abs(float(source.frames[mirror.frame].u[mirror.index, 0])) < ON_SEAM
-    return mirror.frame == "b" and "a" in source.frames and on_seam
 
 
 @dataclass(frozen=True)
