@@ -27,7 +27,7 @@ from tbcad.light.reconstruction.picture import field_picture
 from tbcad.light.simulate.camera_photographs import camera_photographs
 from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.light.simulate.capture.photograph import to_bytes
-from tbcad.light.simulate.scene.object_from_file import ObjectOptions, Paint, load_or_built_in
+from tbcad.light.simulate.scene.object_from_file import ObjectOptions, Paint, load_object
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
@@ -132,7 +132,7 @@ def scene_of(subject: Subject, folder: Path) -> Scene:
         path = folder / "object.ply"
         subject.mesh.export(path)
     options = ObjectOptions(paint=subject.paint)
-    return replace(prepared_scene(load_or_built_in(path, CAPTURE_MM, options)), gloss=subject.gloss)
+    return replace(prepared_scene(load_object(path, CAPTURE_MM, options)), gloss=subject.gloss)
 
 
 def photographed(export: ExportedDesign, scene: Scene) -> LightField:

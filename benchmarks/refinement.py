@@ -22,7 +22,7 @@ from tbcad.light.reconstruction.rays import CapturedRays, captured_rays, entries
 from tbcad.light.reconstruction.start import Level, Settings
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import to_bytes
-from tbcad.light.simulate.scene.object_from_file import load_or_built_in
+from tbcad.light.simulate.scene.object_from_file import load_object
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import camera_around_object
 from tbcad.light.simulate.views.refocus import pinhole_picture
@@ -112,6 +112,6 @@ if __name__ == "__main__":
     parser.add_argument("--object", type=Path, help="what it shows (default: the built-in knot)")
     options = parser.parse_args()
     light_field = LightField.read(options.capture)
-    shown = prepared_scene(load_or_built_in(options.object, light_field.capture_mm))
+    shown = prepared_scene(load_object(options.object, light_field.capture_mm))
     for line in rows(light_field, shown):
         print(line, flush=True)

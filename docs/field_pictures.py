@@ -12,8 +12,9 @@ from pathlib import Path
 from PIL import Image, ImageDraw, ImageFont
 
 import tbcad
-from tbcad.app.cli.commands.refocus import scene_of, true_picture
+from tbcad.app.cli.commands.refocus import true_picture
 from tbcad.light.reconstruction.field import NAME, read_field
+from tbcad.light.simulate.capture.files import captured_scene
 from tbcad.light.simulate.scene.rays import camera_around_object
 
 PICTURES = Path(__file__).parent / "pictures"
@@ -26,7 +27,7 @@ BACKGROUND = "white"
 def captured_views(folder: Path) -> dict[str, list[Image.Image]]:
     """Views from each place by each method, and the truth."""
     light_field, field = tbcad.LightField.read(folder), read_field(folder / NAME)
-    views, scene = tbcad.Views(light_field), scene_of(folder)
+    views, scene = tbcad.Views(light_field), captured_scene(folder)
     if scene is None:
         sys.exit(f"{folder} has no object: simulate a capture")
     columns: dict[str, list[Image.Image]] = {}

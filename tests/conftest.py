@@ -2,8 +2,9 @@
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -41,6 +42,18 @@ def without_fsync() -> Iterator[None]:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Designs of many sizes take longest: last, one process would wait for another."""
     items.sort(key=lambda item: item.get_closest_marker("designs") is None)
+
+
+@pytest.fixture
+def cli(capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
+    """Run a command of words, which is to end with a code; gives what it printed."""
+
+    def command(*words: object, code: int = 0) -> Any:
+        capsys.readouterr()
+        assert run([*map(str, words)]) == code
+        return capsys.readouterr()
+
+    return command
 
 
 @pytest.fixture(scope="session")

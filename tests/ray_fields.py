@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.light.reconstruction.field import Grid
-from tbcad.light.reconstruction.rays import CapturedRays
+from tbcad.light.reconstruction.rays import NO_FOOTPRINT, CapturedRays
 from tbcad.types import Bools, Floats
 
 RADIUS = 10.0  # of the capture sphere, mm
@@ -41,15 +41,16 @@ def rays_of(balls: list[Ball], count: int, seed: int = 0) -> CapturedRays:
         colour[at < nearest] = ball.colour
         nearest = np.minimum(nearest, at)
     length = -2 * (entry * direction).sum(axis=1)
-    single = [values.astype(np.float32) for values in (entry, direction, length)]
-    return CapturedRays(
-        *single,
-        colour,
-        np.arange(count, dtype=np.int32) % 50,
-        np.ones(count, dtype=np.float32),
-        np.zeros((1, 4, 3), dtype=np.float32),
-        2 * RADIUS,
-    )
+    columns = (entry, direction, length, colour, np.arange(count) % 50)
+    return captured_along(*columns, capture_mm=2 * RADIUS)
+
+
+def captured_along(*columns: Floats, capture_mm: float) -> CapturedRays:
+    """Single rays that weigh alike: where they enter, direction, length, colour, mirror."""
+    *floating, mirror = columns
+    single = [values.astype(np.float32) for values in floating]
+    weight = np.ones(len(mirror), dtype=np.float32)
+    return CapturedRays(*single, mirror.astype(np.int32), weight, NO_FOOTPRINT, capture_mm)
 
 
 def whole_cells(grid: Grid) -> Bools:

@@ -18,7 +18,7 @@ def mean_ssim(tiles: MirrorTiles, scene: Scene) -> float:
     """Of views from three sides."""
     found = []
     for azimuth, elevation in np.radians(THREE_SIDES_DEG):
-        at = camera_around_object(azimuth, elevation, DISTANCE_MM, CAPTURE_MM, SIZE_PX, None)
+        at = camera_around_object(azimuth, elevation, DISTANCE_MM, CAPTURE_MM, SIZE_PX)
         truth = np.rint(pinhole_picture(scene, at)).astype(np.uint8)
         found.append(image_quality(truth, synthesise(tiles, at).image).ssim)
     return float(np.mean(found))

@@ -60,16 +60,17 @@ def shown_colour(factor: Bytes) -> tuple[float, ...]:
     return (*srgb(np.array(light)).tolist(), float(opacity))
 
 
-def png_bytes(picture: NDArray[np.uint8] | NDArray[np.uint16], largest_px: int = 0) -> bytes:
-    """Return a picture as a PNG file, every k-th pixel where its longer side is too large (0: any).
+def image_bytes(
+    picture: NDArray[np.uint8] | NDArray[np.uint16], kind: str = "PNG", **options: int
+) -> bytes:
+    """Return a picture as a file of a kind that Pillow writes.
 
     Red, green, blue, 0 to 255, (h, w, 3), or grey, of 8 or 16 bits, (h, w).
     """
     from PIL import Image
 
-    step = -(-max(picture.shape[:2]) // largest_px) if largest_px else 1
     file = BytesIO()
-    Image.fromarray(picture[::step, ::step]).save(file, format="PNG")
+    Image.fromarray(np.ascontiguousarray(picture)).save(file, kind, **options)
     return file.getvalue()
 
 

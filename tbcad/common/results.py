@@ -39,8 +39,11 @@ class Table:
     ) -> "Table":
         """A table of columns of one length; NaN becomes an empty cell."""
         values = [np.asarray(column).tolist() for column in columns.values()]
-        rows = tuple(tuple(map(_cell, row)) for row in zip(*values, strict=True))
-        return Table(name, tuple(columns), rows, notes)
+        rows = (
+            tuple(None if isinstance(cell, float) and math.isnan(cell) else cell for cell in row)
+            for row in zip(*values, strict=True)
+        )
+        return Table(name, tuple(columns), tuple(rows), notes)
 
     @staticmethod
     def of_records(
@@ -80,10 +83,6 @@ def csv_text(table: Table) -> str:
     writer.writerow(table.columns)
     writer.writerows(table.rows)
     return file.getvalue()
-
-
-def _cell(value: Cell) -> Cell:
-    return None if isinstance(value, float) and math.isnan(value) else value
 
 
 PANEL_INCHES = (6.4, 5.2)

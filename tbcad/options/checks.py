@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tbcad.errors import InputError
+from tbcad.options.shared import AnyPath
 
 DESIGN_FILE = "design.json"
 LIGHT_FIELD_FILE = "lightfield.h5"
@@ -33,14 +34,14 @@ def _check_has(folder: Path, file: str, writer: str) -> None:
         raise InputError(f"{folder / file} is not there: name a folder that tbcad {writer} wrote")
 
 
-def check_is_object(path: Path | None, up: str | None, unit: str | None) -> None:
+def check_is_object(path: AnyPath | None, up: str | None, unit: str | None) -> None:
     """Refuse a mesh that is no file; without one the built-in object is taken.
 
     InputError: it is none, or its axis or unit is given without it.
     """
     if path is None and (up or unit):
         raise InputError("--up and --unit are of a file: give --object too, or leave them out")
-    if path is not None and not path.is_file():
+    if path is not None and not Path(path).is_file():
         raise InputError(f"{path}: no such file; give a triangle mesh (PLY, STL, OBJ, GLB ...)")
 
 

@@ -53,8 +53,6 @@ Width = Annotated[int, typer.Option(min=16, max=8192)]
 """Width of the picture, pixels."""
 Height = Annotated[int, typer.Option(min=16, max=8192)]
 """Height of the picture, pixels."""
-Fov = Annotated[float | None, typer.Option()]
-"""Horizontal angle of view, degrees; by default the capture sphere fills the picture."""
 PaintOption = Annotated[Literal["own", "pattern", "plain"], typer.Option()]
 """own: colours or texture of the file, or a pattern where it has none; pattern: always the pattern;
 plain: grey."""

@@ -6,7 +6,7 @@ import re
 import shutil
 import zipfile
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import chain, count
 from os import PathLike
 from pathlib import Path
@@ -74,14 +74,21 @@ def _places(path: Path) -> list[_Place]:
     return [(one.st_dev, one.st_ino) for one in found]
 
 
-def check_file(file: Path, force: bool, inputs: Iterable[Path | None] = ()) -> None:
+def check_file(
+    file: Path, force: bool, inputs: Iterable[Path | None] = (), suffixes: Sequence[str] = ()
+) -> None:
     """Refuse, before any work, a file that must not be replaced, or without force one that exists.
 
-    Inputs are files that the command reads, which stay even so.
+    Inputs are files that the command reads, which stay even so. With suffixes it has one of them,
+    in a folder that exists.
 
     InputError as said, or the file belongs to what tbcad wrote, or is a folder.
     """
     with write_errors_as_input_errors(file):
+        if suffixes and file.suffix.lower() not in suffixes:
+            raise InputError(f"{file}: name a file that ends in {' or '.join(suffixes)}")
+        if suffixes and not file.parent.is_dir():
+            raise InputError(f"{file}: its folder does not exist: make it, or choose another")
         if file.is_dir():
             raise InputError(f"{file} is a folder: choose another name")
         if file.exists():

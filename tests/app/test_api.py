@@ -8,7 +8,6 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import tbcad
@@ -99,16 +98,6 @@ def test_a_function_says_in_one_line_what_it_wants() -> None:
             getattr(tbcad, name)(3)
         with pytest.raises(InputError, match=missing):
             getattr(tbcad, name)("absent")
-
-
-def test_from_a_design_to_a_view(tmp_path: Path) -> None:
-    small = ("camera.width_px=208", "camera.height_px=155")
-    built = tbcad.build(n=3, settings=small, out=tmp_path / "e", parts=["shell"], verify=False)
-    assert built.design.spec.optics.n == 3
-    knot = tbcad.capture(built, out=tmp_path / "knot")
-    asked = {"size": (64, 48), "method": "nearest"}
-    view = tbcad.view(tmp_path / "knot", **asked)  # type: ignore[arg-type]
-    assert np.array_equal(view.image, tbcad.view(knot, **asked).image)  # type: ignore[arg-type]
 
 
 def test_a_mandrel_is_a_part() -> None:

@@ -225,8 +225,7 @@ def as_made(
 ) -> AsMade | None:
     """Simulate a few builds of an export by every built-in process.
 
-    Returns:
-        Their yields; None where no shell was built, or its record cannot be read.
+    None where no shell was built, or its record cannot be read.
     """
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.tolerancing.montecarlo.builds import as_made as simulated
@@ -246,11 +245,7 @@ def as_made(
 def report_page(options: ReportOptions) -> Path:
     """Write the page that shows an export: one HTML file with its verdict, 3D view and tables.
 
-    Returns:
-        The file.
-
-    Raises:
-        InputError: the export or the capture cannot be read, or the file may not be written.
+    InputError: the export or the capture cannot be read, or the file may not be written.
     """
     folder = Path(options.exports)
     file, light_field = (

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tbcad.light.reflectance.environment import LightFormat
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.capture.photograph import CameraPhotographs
-    from tbcad.light.simulate.scene.object import SceneObject
+    from tbcad.light.simulate.scene.ray_casting import Scene
 
 
 @keywords(CaptureOptions)
@@ -44,7 +44,7 @@ class Photographs:
     """Both photographs before they are taken: light is traced when their bands are asked for."""
 
     cameras: CameraPhotographs  # each camera with what gives its bands of pixel rows
-    subject: SceneObject  # the object before the cameras
+    scene: Scene  # the object before the cameras
     capture_mm: float  # diameter of the capture sphere
     facts: dict[str, Any]  # how they are taken: design, n, geometry, samples
     sources: tuple[AnyPath | None, ...] = ()  # files and folders that they are made from
@@ -55,10 +55,10 @@ def photograph(options: CaptureOptions) -> Photographs:
     options.check()
     exports, file = Path(options.exports), options.object_file
     check_is_export(exports)
-    check_is_object(None if file is None else Path(file), options.up, options.unit)
+    check_is_object(options.object_file, options.up, options.unit)
     from tbcad.light.simulate.camera_photographs import camera_photographs
     from tbcad.light.simulate.scene.lamps import lit_by, read_lamps
-    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
+    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
     from tbcad.light.simulate.scene.ray_casting import prepared_scene
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.output.folder import check_replaceable
@@ -70,12 +70,11 @@ def photograph(options: CaptureOptions) -> Photographs:
     options.progress("object and scene")
     export = read_export(exports)
     taken = ObjectOptions(options.fit, options.paint, options.up, options.unit)
-    subject = load_or_built_in(file, export.capture_mm, taken, options.answer)
+    subject = load_object(file, export.capture_mm, taken, options.answer)
     lamps = read_lamps(export.folder) if options.geometry == "prototype" else None
     subject = lit_by(lamps, subject) if lamps else subject
-    cameras = camera_photographs(
-        export, prepared_scene(subject), options.geometry, options.samples, options.detail
-    )
+    scene = prepared_scene(subject)
+    cameras = camera_photographs(export, scene, options.geometry, options.samples, options.detail)
     facts = {
         "object": subject.name,
         "design": export.spec.name,
@@ -85,7 +84,7 @@ def photograph(options: CaptureOptions) -> Photographs:
     } | ({"light": "lamps of the prototype"} if lamps else {})
     if subject.reading is not None:
         facts["object_file"] = asdict(subject.reading)
-    return Photographs(cameras, subject, export.capture_mm, facts, sources)
+    return Photographs(cameras, scene, export.capture_mm, facts, sources)
 
 
 def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict[str, Any]:
@@ -101,28 +100,22 @@ def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict
     from tbcad.light.simulate.capture.files import write_capture
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.capture.sequence import turns, write_turning
-    from tbcad.light.simulate.scene.ray_casting import prepared_scene
     from tbcad.output.folder import replacing
     from tbcad.output.manifest import write_manifest
 
-    lights, table = options.lights, None
+    lights, scene, table = options.lights, photographs.scene, None
     if lights is not None and str(lights) not in (MIRRORS, PROJECTORS):
         table = read_lamp_places(Path(lights), photographs.capture_mm)  # before long work
     options.progress("photographs and light field")
     out = Path(options.out or "")
     with replacing(out, "capture", options.force, photographs.sources) as folder:
-        record = write_capture(
-            folder,
-            photographs.cameras,
-            photographs.subject,
-            photographs.capture_mm,
-            photographs.facts,
-        )
+        taken = photographs.cameras, scene.subject, photographs.capture_mm, photographs.facts
+        record = write_capture(folder, *taken)
         if lights is not None:
             from tbcad.light.reflectance.transport import write_reflectance
 
             options.progress("a photograph for each lamp")
-            scene, thrown = prepared_scene(photographs.subject), str(lights) == PROJECTORS
+            thrown = str(lights) == PROJECTORS
             with LightField.open(folder) as source:
                 lamps = table or lamps_of_mirrors(source, options.every)
                 record["reflectance"] = write_reflectance(
@@ -130,7 +123,6 @@ def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict
                 )
         if options.frames is not None:
             options.progress("a photograph for each frame")
-            scene = prepared_scene(photographs.subject)
             angles = turns(options.frames, radians(options.turn))
             with LightField.open(folder) as source:
                 record["sequence"] = write_turning(folder, source, scene, angles, options.detail)
@@ -189,20 +181,18 @@ def dataset(options: ExportOptions) -> dict[str, Any]:
     place, out, exports = Path(options.capture), Path(options.out), options.exports
     check_is_capture(place)
     from tbcad.light.datasets.export import write_dataset, write_scene
-    from tbcad.light.simulate.capture.files import OBJECT, read_object
+    from tbcad.light.simulate.capture.files import captured_scene
     from tbcad.light.simulate.capture.light_field import LightField
-    from tbcad.light.simulate.scene.ray_casting import prepared_scene
     from tbcad.output.folder import check_replaceable, replacing
     from tbcad.output.manifest import write_manifest
 
     inputs = (place if place.is_dir() else place.parent, exports)
     check_replaceable(out, "dataset", options.force, inputs)
-    known = (place / OBJECT).is_file()
     with (
         LightField.open(place) as source,
         replacing(out, "dataset", options.force, inputs) as folder,
     ):
-        scene = prepared_scene(read_object(place)) if known else None
+        scene = captured_scene(place)
         if exports is not None:
             record = write_scene(folder, source, scene, Path(exports), options.progress)
         else:

@@ -58,7 +58,7 @@ def simulate_run(options: SimulateRunOptions) -> Run:
     """
     exports, folder, file = Path(options.exports), Path(options.out), options.object_file
     check_is_export(exports)
-    check_is_object(None if file is None else Path(file), options.up, options.unit)
+    check_is_object(options.object_file, options.up, options.unit)
     if options.bits not in (8, 16):
         raise InputError(f"--bits {options.bits} is not written: allowed is 8 or 16")
     options.stop_numbers()  # refused before what is heavy is loaded
@@ -171,11 +171,8 @@ def merge(options: MergeOptions) -> dict[str, Any]:
 def as_built(options: AsBuiltOptions) -> dict[str, Any]:
     """Write the balls of a calibrated prototype as exact solids, coloured by their errors.
 
-    Returns:
-        What is in as_built.json.
-
-    Raises:
-        InputError: a file cannot be read, they do not belong together, or out cannot be replaced.
+    Returns what is in as_built.json. InputError: a file cannot be read, they do not belong
+    together, or out cannot be replaced.
     """
     known, out = Path(options.calibration), Path(options.out)
     check_is_calibration(known)

@@ -159,7 +159,6 @@ def checked_frames(options: ReconstructOptions) -> list[FrameFiles]:
     if options.force and options.resume:
         raise InputError("--force and --resume exclude each other: leave one out")
     from tbcad.light.simulate.capture.sequence import NAME, frame_count
-    from tbcad.light.simulate.image_files import check_image_path
     from tbcad.output.single_files import check_file
 
     numbers = range(frame_count(folder)) if options.frame == "all" else (options.frame,)
@@ -167,8 +166,7 @@ def checked_frames(options: ReconstructOptions) -> list[FrameFiles]:
     light_field = folder / LIGHT_FIELD_FILE if capture.is_dir() else capture
     taken: set[Path] = set()
     for file, suffixes, may_be in _files(options, frames):
-        check_image_path(file, True, suffixes)
-        check_file(file, may_be, (light_field, folder / NAME))
+        check_file(file, may_be, (light_field, folder / NAME), suffixes)
         if (place := file.parent.resolve() / file.name) in taken:
             raise InputError(f"{file} is named twice: choose another name")
         taken.add(place)

@@ -61,13 +61,7 @@ def verify_as_built(
 ) -> AsBuiltReport:
     """Verify the prototype of a build as a calibration found it: coverage, and what to shim.
 
-    Args:
-        exports: folder that `build` wrote.
-        calibration: folder that `tbcad calibrate` wrote.
-        progress: called with the name of each stage.
-
-    Raises:
-        InputError: one cannot be read, or they do not belong together. Nothing is written.
+    InputError: one cannot be read, or they do not belong together. Nothing is written.
     """
     from tbcad_verify.as_built.verify import verify_as_built as verify_machine
     from tbcad_verify.errors import BadExport
@@ -89,14 +83,14 @@ def tolerance(options: ToleranceOptions) -> Analysis:
         InputError: export or process cannot be read, or mirrors are planar.
     """
     process, exports = checked_process(options), Path(options.exports)
-    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
+    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.tolerancing.analysis import analyse as analyse_export
 
     options.progress("record of the export")
     export = read_export(exports)
     taken = ObjectOptions(up=options.up, unit=options.unit)
-    subject = load_or_built_in(options.object_file, export.capture_mm, taken, options.answer)
+    subject = load_object(options.object_file, export.capture_mm, taken, options.answer)
     return analyse_export(export, process, subject, options)
 
 
@@ -112,25 +106,18 @@ def checked_process(options: ToleranceOptions) -> Process:
         raise InputError(f"--builds {options.builds}: allowed is {LEAST_BUILDS} to 1000000")
     check_yield(options.wanted_yield)
     check_is_export(Path(options.exports))
-    file = options.object_file
-    check_is_object(None if file is None else Path(file), options.up, options.unit)
+    check_is_object(options.object_file, options.up, options.unit)
     return process
 
 
 @keywords(OrderOptions)
 def order(options: OrderOptions) -> dict[str, Any]:
-    """Write what a workshop needs to make the shells of a build by a process chain.
+    """Write what a workshop needs to make the shells of a build by a process chain; order.json.
 
     By how much each mirror may be off and what the chain holds of it: tables, STEP with tolerances,
-    and a page that says the rest.
-
-    Returns:
-        What is in order.json.
-
-    Raises:
-        InputError: the export has no shells, or no mandrels that the chain needs, their mirrors are
-            planar or may not be off at all, the chain cannot be read, the share is not between 0
-            and 1, or out cannot be replaced.
+    and a page that says the rest. InputError: the export has no shells, or no mandrels that the
+    chain needs, their mirrors are planar or may not be off at all, the chain cannot be read, the
+    share is not between 0 and 1, or out cannot be replaced.
     """
     exports, out = Path(options.exports), Path(options.out)
     check_is_export(exports)

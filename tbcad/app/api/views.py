@@ -27,13 +27,7 @@ class Views:
     >>> pictures = [views.view(azimuth, 30).image for azimuth in range(0, 360, 4)]
     """
 
-    def __init__(
-        self,
-        source: LightField | Field | Path | str,
-        *,
-        quick: bool = False,
-        progress: Progress = silent,
-    ) -> None:
+    def __init__(self, source: LightField | Field | Path | str, *, quick: bool = False) -> None:
         """Read nothing yet.
 
         Args:
@@ -41,10 +35,9 @@ class Views:
                 of a capture, which is shown by the field in it, if there is one.
             quick: look for the depth of a light field on fewer planes and at fewer points: a sixth
                 of the time.
-            progress: called with the state of what is made once.
         """
         self._source = Path(source) if isinstance(source, str) else source
-        self._quick, self._progress = quick, progress
+        self._quick = quick
 
     @cached_property
     def light_field(self) -> LightField:
@@ -83,7 +76,7 @@ class Views:
         from tbcad.light.depth.depth_map import depth_views
         from tbcad.light.depth.plane_sweep import FINE, QUICK
 
-        return depth_views(self.tiles, QUICK if self._quick else FINE, self._progress)
+        return depth_views(self.tiles, QUICK if self._quick else FINE)
 
     def view(
         self,
@@ -100,15 +93,13 @@ class Views:
             InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the
                 object; a method is named for a field.
         """
-        from math import radians
-
         from tbcad.light.reconstruction.field import Field
-        from tbcad.light.simulate.scene.rays import camera_around_object
+        from tbcad.light.viewer.page import Query
 
         made = self._field if method is None or isinstance(self._source, Field) else None
-        angles = radians(azimuth_deg), radians(elevation_deg)
         capture_mm = self.light_field.capture_mm if made is None else made.grid.width_mm
-        camera = camera_around_object(*angles, distance_mm, capture_mm, size)
+        view = Query(azimuth_deg, elevation_deg, distance_mm, width=size[0], height=size[1])
+        camera = view.camera(capture_mm)
         if made is None:
             from tbcad.light.simulate.views.synthesis import synthesise
 
@@ -202,15 +193,13 @@ def refocus(
         InputError: the viewpoint lies below the hemisphere of virtual cameras, or in the object;
             there is no such lens, or its focus is far from the object.
     """
-    from math import radians
-
-    from tbcad.light.simulate.scene.rays import camera_around_object
     from tbcad.light.simulate.views.refocus import ThinLens
+    from tbcad.light.viewer.page import Query
 
     views = Views(source)
-    angles = (radians(azimuth_deg), radians(elevation_deg))
     capture_mm = views.light_field.capture_mm
-    at = camera_around_object(*angles, distance_mm, capture_mm, size)
+    view = Query(azimuth_deg, elevation_deg, distance_mm, width=size[0], height=size[1])
+    at = view.camera(capture_mm)
     lens = ThinLens(aperture_mm, focus_mm)
     lens.check(at, capture_mm)
     return refocused(views.tiles, at, lens, all_in_focus)

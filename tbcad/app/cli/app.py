@@ -86,11 +86,11 @@ def _common(
     del version
 
 
-def on_screen(number: int, function: str, options: Call, *, silent: bool = False) -> Any:
+def on_screen(number: int, function: str, options: Call) -> Any:
     """Call a function of the API by its name, about so many stages of it on the screen."""
     from tbcad.app import api
 
-    with stages(number, silent) as screen:
+    with stages(number) as screen:
         return getattr(api, function)(options.on(screen))
 
 

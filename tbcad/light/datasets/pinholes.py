@@ -28,7 +28,7 @@ from tbcad.core.optics.camera import Camera, LensCamera
 from tbcad.light.datasets.pictures import PinholePictures, crop_of
 from tbcad.light.datasets.virtual_cameras import Crop, FittedCameras, at_middle
 from tbcad.light.simulate.capture.light_field import LightField
-from tbcad.light.simulate.image_files import png_bytes
+from tbcad.light.simulate.image_files import quick_png
 from tbcad.light.simulate.parallel import in_batches
 from tbcad.types import Bools, Bytes, Floats, Progress
 
@@ -162,13 +162,13 @@ def write_pictures(
     (folder / IMAGES).mkdir()
     (folder / MASKS).mkdir()
     for name, picture, mask in zip(names, pictures.picture, pictures.mask, strict=True):
-        (folder / IMAGES / f"{name}.png").write_bytes(png_bytes(picture))
+        (folder / IMAGES / f"{name}.png").write_bytes(quick_png(picture))
         (folder / MASKS / f"{name}{mask_suffix}").write_bytes(mask_png(mask))
 
 
 def mask_png(mask: Bools) -> bytes:
     """A mask (h, w) as a grey picture: white where it is true."""
-    return png_bytes(np.where(mask, 255, 0).astype(np.uint8))
+    return quick_png(np.where(mask, 255, 0).astype(np.uint8))
 
 
 def write_ngp_rays(
@@ -182,9 +182,8 @@ def write_ngp_rays(
         name = virtual.mirrors[k].name
         crop = crop_of(source, virtual.mirrors[k]).flipped()
         pinhole = fitted_pinhole(crop, virtual.centre[k])
-        (images / f"{name}.png").write_bytes(
-            png_bytes(np.where(crop.meets[..., None], crop.colour, 0))
-        )
+        picture = np.where(crop.meets[..., None], crop.colour, 0)
+        (images / f"{name}.png").write_bytes(quick_png(picture))
         (images / f"dynamic_mask_{name}.png").write_bytes(mask_png(~crop.meets))
         (images / f"rays_{name}.dat").write_bytes(rays_file(crop, pinhole))
         numbers = *pinhole.focal.tolist(), *(pinhole.principal + CORNER).tolist()
@@ -219,7 +218,8 @@ def seed_points(
 
     Cameras (m,), what they see (m, h, w, 3), and where that is known (m, h, w).
     """
-    points = _candidates(capture_mm / 2)
+    points = capture_mm * (qmc.Halton(3, scramble=False).random(CANDIDATES) - 0.5)
+    points = points[norm(points) < capture_mm / 2]
     step = -(-len(cameras) // MOST_CAMERAS)
     some = zip(cameras[::step], pictures[::step], masks[::step], strict=True)
     seen = [_colours(camera, picture, mask, points) for camera, picture, mask in some]
@@ -231,12 +231,6 @@ def seed_points(
     values = np.where(known[:, kept, None], colours[:, kept].astype(np.float32), np.nan)
     median = np.nanmedian(values, axis=0)
     return SeedPoints(points[kept], np.rint(median).astype(np.uint8))
-
-
-def _candidates(radius: float) -> Floats:
-    cube = qmc.Halton(3, scramble=False).random(CANDIDATES)
-    points = radius * (2 * cube - 1)
-    return np.asarray(points[norm(points) < radius])
 
 
 def _colours(camera: Camera, picture: Bytes, mask: Bools, points: Floats) -> tuple[Bytes, Bools]:

@@ -11,9 +11,8 @@ from PIL import Image
 
 from tbcad.cad.formats.mesh_files import points_ply
 from tbcad.common.compiled import compiled_loop
-from tbcad.common.figure_files import png_bytes
+from tbcad.common.figure_files import image_bytes
 from tbcad.core.optics.camera import Camera
-from tbcad.errors import InputError
 from tbcad.light.datasets.pictures import PinholePictures, pinhole_pictures
 from tbcad.light.depth.plane_sweep import FINE, Sweep, swept_depth
 from tbcad.light.simulate.capture.light_field import LightField
@@ -33,7 +32,7 @@ def depth_png(depth: Floats, capture_mm: float) -> bytes:
     """Depth (h, w) as a PNG of 16 bits: 1 at the capture sphere's back, 65535 at its front."""
     share = 0.5 - depth / capture_mm
     number = np.rint(1 + (FRONT - 1) * np.clip(share, 0, 1))
-    return png_bytes(np.nan_to_num(number).astype(np.uint16))
+    return image_bytes(np.nan_to_num(number).astype(np.uint16))
 
 
 def depth_points(view: Camera, depth: Floats) -> Floats:
@@ -109,10 +108,7 @@ def _along(away: Floats, axes: Floats, pitch: float, direction: Floats) -> Float
 
 
 def depth_map(pictures: PinholePictures, view: Camera, sweep: Sweep = FINE) -> DepthMap:
-    """The depth of a view; InputError where its camera does not look at the origin."""
-    aside = np.linalg.norm(np.cross(view.pinhole, view.forward))
-    if aside > pictures.capture_mm / 2:
-        raise InputError("the view does not look at the object: turn its camera to the origin")
+    """The depth of a view, whose camera looks at the origin."""
     size = -(-view.width_px // sweep.step_px), -(-view.height_px // sweep.step_px)
     smaller = replace(view, width_px=max(size[0], 1), height_px=max(size[1], 1))
     depth, confidence = swept_depth(pictures, smaller, sweep)
@@ -132,8 +128,7 @@ class DepthViews:
     ) -> tuple[SynthesisedView, DepthMap]:
         """The picture that a pinhole camera which looks at the origin would see, and its depth.
 
-        `shown` is another light field of the same rays, whose colours the picture has. InputError
-        where the camera looks elsewhere.
+        `shown` is another light field of the same rays, whose colours the picture has.
         """
         found = depth_map(self.pictures, view, self.sweep)
         return synthesise(shown or self.tiles, view, found.along_rays), found

@@ -24,7 +24,6 @@ from trimesh.visual.material import PBRMaterial
 
 from tbcad.cad.formats.glb import UPRIGHT
 from tbcad.common.figure_files import srgb_light
-from tbcad.errors import InputError
 from tbcad.light.reconstruction.field import Field
 from tbcad.light.reconstruction.marching import MATT, Singles
 from tbcad.light.reconstruction.rays import CapturedRays
@@ -45,16 +44,12 @@ def mesh_file(mesh: trimesh.Trimesh, suffix: str) -> bytes:
     """The file of a mesh in mm with colours (sRGB) at its points; the same bytes for the same mesh.
 
     By the suffix: .glb in metres and y up, as glTF demands; .ply in mm with colours; .stl in mm,
-    binary, without colours. InputError: the suffix is another.
+    binary, without colours.
     """
-    kind = suffix.lower()
-    if kind not in MESH_SUFFIXES:
-        raise InputError(
-            f"{suffix!r} is no kind of mesh file: allowed are {', '.join(MESH_SUFFIXES)}"
-        )
-    if kind == ".glb":
+    kind = suffix.lower()[1:]
+    if kind == "glb":
         return _glb(mesh)
-    content = mesh.export(file_type=kind[1:])
+    content = mesh.export(file_type=kind)
     return content if isinstance(content, bytes) else content.encode("ascii")
 
 

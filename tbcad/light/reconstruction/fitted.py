@@ -74,7 +74,9 @@ def reconstruction(
     """
     options.progress(READING)
     asked = asked_for(source, options, last)
-    settings = _settings(source, options)
+    places = CENTRAL if options.rays == 1 else _places(source, options)
+    order = int(options.order == "1")
+    settings = Settings(levels(options), order=order, places=places, seed=options.seed)
     saved = None
     if part is not None and part.exists():
         saved = read_checkpoint(part, asked, settings.places)
@@ -119,13 +121,6 @@ def levels(options: ReconstructOptions) -> tuple[Level, ...]:
         )
         for one in usual
     )
-
-
-def _settings(source: LightField, options: ReconstructOptions) -> Settings:
-    """As asked, before anything is chosen."""
-    places = CENTRAL if options.rays == 1 else _places(source, options)
-    order = int(options.order == "1")
-    return Settings(levels(options), order=order, places=places, seed=options.seed)
 
 
 def _places(source: LightField, options: ReconstructOptions) -> Singles:

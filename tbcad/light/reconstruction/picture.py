@@ -9,7 +9,7 @@ from threading import Lock
 import numpy as np
 from scipy import ndimage
 
-from tbcad.common.figure_files import png_bytes
+from tbcad.common.figure_files import image_bytes
 from tbcad.core.geometry.vectors import dot, unit
 from tbcad.core.optics.camera import Camera
 from tbcad.light.reconstruction.field import Field
@@ -96,16 +96,12 @@ def field_normals(made: Field, view: Camera, picture: FieldPicture) -> Floats:
     opaque = ndimage.gaussian_filter(opaque, SMOOTHED)
     normal = -direction
     for _ in range(2):
-        normal = _toward(normal, -_gradient(opaque, at + BEFORE * normal), direction)
+        found = -_gradient(opaque, at + BEFORE * normal)
+        side = -np.sign(dot(found, direction))[:, None]  # against the rays; 0: there is none
+        normal = np.where(side != 0, side * unit(found), normal)
     result = np.full((*known.shape, 3), np.nan)
     result[known] = normal
     return result
-
-
-def _toward(before: Floats, found: Floats, direction: Floats) -> Floats:
-    """Unit vectors (k, 3) along those found, against the rays; where there are none, as before."""
-    side = -np.sign(dot(found, direction))[:, None]
-    return np.where(side != 0, side * unit(found), before)
 
 
 def _gradient(lattice: Singles, at: Floats) -> Floats:
@@ -120,12 +116,12 @@ def _gradient(lattice: Singles, at: Floats) -> Floats:
 def normals_png(normals: Floats) -> bytes:
     """Normals (h, w, 3) as a PNG: red, green, blue are 0.5 + 0.5 x, y, z; black: unknown."""
     shown = np.rint(255 * (0.5 + 0.5 * np.nan_to_num(normals, nan=-1.0)))
-    return png_bytes(shown.astype(np.uint8))
+    return image_bytes(shown.astype(np.uint8))
 
 
 def opacity_png(picture: FieldPicture) -> bytes:
     """The opacity as a PNG in grey: 0 nothing, 255 opaque."""
-    return png_bytes(np.rint(255 * np.clip(picture.opacity, 0, 1)).astype(np.uint8))
+    return image_bytes(np.rint(255 * np.clip(picture.opacity, 0, 1)).astype(np.uint8))
 
 
 def write_preview(file: Path, made: Field) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tbcad.errors import InputError
 from tbcad.light.reconstruction.marching import Singles
 from tbcad.light.simulate.capture.light_field import RAY_SIGMAS, CameraFrame, LightField
+from tbcad.light.simulate.views.refocus import GOLDEN_ANGLE
 from tbcad.types import Bools, Floats, Ints
 
 LEAST_CHORD_MM = 0.03
@@ -18,7 +19,6 @@ DARKEST = 0.02  # of white: less is called dark whatever the noise
 NOISE = 6.0  # times the distance of the median from the mean below it: all but a few
 PATTERNS = 8  # turned against each other
 SQUARE_VARIANCE = 1 / 12  # of a pixel's square, along each side
-GOLDEN_ANGLE = np.pi * (3 - 5**0.5)
 
 
 @dataclass(frozen=True)

@@ -26,10 +26,10 @@ from tbcad.light.reconstruction.marching import MATT, SOFTNESS, Singles, composi
 from tbcad.light.reconstruction.rays import CapturedRays
 from tbcad.light.reconstruction.start import NUMBERS
 from tbcad.light.simulate.parallel import first_then_threads, in_threads, over_chunks
+from tbcad.light.simulate.scene.lamps import free_rays
 from tbcad.light.simulate.scene.ray_casting import embree_scene
 from tbcad.types import Bools, Bytes, Floats, Ints
 
-LEVELS = (0.01, 6.0)  # 1/mm, that may be asked for
 TRIED = np.geomspace(0.08, 5.12, 19)  # 1/mm: three to a factor of two
 MOST_TRIED = 100_000  # held rays
 OFF_NODES = 2e-3  # of the number: points so near to a node would be points of no distance
@@ -52,11 +52,9 @@ def best_level(made: Field, rays: CapturedRays, held: Bools) -> float:
     Of all levels it is the one where fewest rays see the background though they meet the surface,
     or something though they miss it. Rays that do so at any level, as those of black things, do not
     matter. The place where rays become half opaque is no measure: it lies behind the surface.
-    InputError: no ray is held out, or the field is empty.
+    InputError: the field is empty.
     """
     which = np.flatnonzero(held)
-    if len(which) == 0:
-        raise InputError("no ray is held out, so none tells the level of the surface: give one")
     which = which[:: -(-len(which) // MOST_TRIED)]
     bright = rays.colour[which].max(axis=1) >= rays.dark_level()
     lattice, corner = _lattice(made)
@@ -85,14 +83,9 @@ def field_mesh(made: Field, level: float, least_mm: float | None = None) -> trim
     """The surface of a level, 1/mm, as a closed mesh with colours (sRGB) at its points, mm.
 
     Bodies below a size of least_mm go; None: three distances of nodes, about what a mirror resolves
-    (`resolved_mm`): what lies within one pixel of each view may be noise as well. InputError: there
-    is no such level, or nothing is as dense.
+    (`resolved_mm`): what lies within one pixel of each view may be noise as well. InputError:
+    nothing is as dense.
     """
-    if not LEVELS[0] <= level <= LEVELS[1]:
-        raise InputError(
-            f"level {level:g} is no density of a surface: allowed is {LEVELS[0]:g} to "
-            f"{LEVELS[1]:g} 1/mm"
-        )
     pitch, number = made.grid.pitch_mm, _number(level)
     lattice, corner = _lattice(made)
     thin = _contour(lattice, corner, pitch, number)
@@ -189,7 +182,8 @@ def _hidden(embree: Any, points: Singles) -> Bools:
         seen = np.zeros(len(place), dtype=np.int64)
         for toward in _hemisphere(4):
             left = np.flatnonzero(seen < SEEN_FROM)
-            seen[left] += _free(embree, place[left], toward)
+            ways = np.broadcast_to(toward, (len(left), 3))
+            seen[left] += free_rays(embree, place[left], ways)
         return np.asarray(seen < SEEN_FROM)
 
     return over_chunks(part, len(points), POINTS_PER_CHUNK)
@@ -200,14 +194,6 @@ def _hemisphere(n: int) -> Singles:
     directions = geodesic(n)[0].astype(np.float32)
     order = np.argsort(-directions[:, 2], kind="stable")
     return np.asarray(directions[order[directions[order, 2] > 0]])
-
-
-def _free(embree: Any, points: Singles, toward: Singles) -> Bools:
-    """From which points (n, 3) nothing is met in a direction."""
-    if len(points) == 0:
-        return np.zeros(0, dtype=bool)
-    direction = np.broadcast_to(toward, points.shape)
-    return np.asarray(embree.run(points, direction, query="OCCLUDED") != 0)
 
 
 def _bodies(points: Singles, faces: Ints, least: float) -> tuple[Singles, Ints]:
@@ -236,7 +222,7 @@ def _colours(made: Field, mesh: trimesh.Trimesh) -> Bytes:
     def seen(toward: Singles) -> tuple[Ints, Singles]:
         rows = np.flatnonzero(normals @ toward > FACING)
         begin = points[rows] + np.float32(OUTSIDE * pitch) * toward
-        free = _free(embree, begin, toward)
+        free = free_rays(embree, begin, np.broadcast_to(toward, begin.shape))
         length = np.full(int(free.sum()), (OUTSIDE + INSIDE) * pitch, dtype=np.float32)
         back = np.ascontiguousarray(np.broadcast_to(-toward, (len(length), 3)))
         return rows[free], composited(begin[free], back, length, medium)[:, :MATT]

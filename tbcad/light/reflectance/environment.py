@@ -12,6 +12,7 @@ from tbcad.cad.formats.pictures import picture_of
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.lamps import PointLights
+from tbcad.light.simulate.views.refocus import GOLDEN_ANGLE
 from tbcad.types import Floats, Ints
 
 LightFormat: TypeAlias = Literal["latlong", "angular", "mirror-ball", "cross"]
@@ -35,7 +36,6 @@ _BACK = {(3, 1): ((-1, 0, 0), (0, 1, 0), (0, 0, -1)), (1, 3): ((-1, 0, 0), (0, -
 # So far away light from one direction is parallel: 60 mm apart it differs by 0.003 degrees.
 FAR_MM = 1e6
 GIVE = "give a picture of light: Radiance (.hdr), OpenEXR (.exr) or TIFF in floating point"
-GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of red, green, blue: ITU-R BT.709
 
 

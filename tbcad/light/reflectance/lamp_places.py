@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.common.compiled import compiled_loop
-from tbcad.core.geometry.vectors import dot, norm
+from tbcad.core.geometry import vectors
+from tbcad.core.geometry.loop_vectors import divided, dot, minus, plus_scaled, unit, vector
+from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.csv_rows import number, read_rows
 from tbcad.errors import InputError
@@ -32,15 +34,12 @@ from tbcad.types import Floats
 MIRRORS = "mirrors"
 COLUMNS = ("x_mm", "y_mm", "z_mm")
 MAX_MM = 1e9
-# Both halves of a mirror on the seam have one virtual camera.
-ON_SEAM = 1e-9
 PROJECTORS = "projectors"
 # A plane is taken as a sphere so large that it differs by 1e-5 mm over a cell.
 LEAST_CURVATURE = 1e-7
-# Both halves of a mirror on the seam have one direction.
+# Both halves of a mirror on the seam have one direction, and one virtual camera.
 SAME_DIRECTION = 1e-9
-# Newton's steps at most, and the last one's share of the whole angle.
-STEPS, LAST_STEP = 60, 1e-12
+STEPS = 20  # of the search for a point of reflection; each gains a digit or so
 
 
 @dataclass(frozen=True)
@@ -76,18 +75,14 @@ def lamps_of_mirrors(source: LightField, every: int) -> LampPlaces:
 
     InputError: no mirror gives a virtual camera.
     """
-    mirrors = [one for one in chosen_mirrors(source, None, 1) if not _second_half(source, one)]
+    both = [_halves(source, one) for one in chosen_mirrors(source, None, 1)]
+    mirrors = [one for one, *others in both if one.frame == "a" or not others]
     u = np.array([source.frames[one.frame].u[one.index] for one in mirrors])
     kept = spread_evenly(u, -(-len(mirrors) // every))
     virtual = virtual_cameras(source, [mirrors[k] for k in kept])
     if not len(virtual):
         raise InputError("no mirror of the capture gives a virtual camera: give lamps as a table")
     return LampPlaces(tuple(one.name for one in virtual.mirrors), virtual.centre)
-
-
-def _second_half(source: LightField, mirror: MirrorId) -> bool:
-    on_seam = abs(float(source.frames[mirror.frame].u[mirror.index, 0])) < ON_SEAM
-    return mirror.frame == "b" and "a" in source.frames and on_seam
 
 
 @dataclass(frozen=True)
@@ -104,7 +99,7 @@ class MirrorPixels:
     def light(self, embree: Any, spots: Spots) -> Floats:
         """Light on spots (k,), if a white surface at the origin that faces it gets 1."""
         light = np.zeros(len(spots.place))
-        height = dot(self.centre - spots.place, spots.normal)
+        height = vectors.dot(self.centre - spots.place, spots.normal)
         faces = np.flatnonzero(height + self.radius > 0)  # the sphere is not all below the horizon
         some = Spots(spots.place[faces], spots.normal[faces], spots.facet_normal[faces])
         known, spread = reflected(self.centre, self.radius, self.camera.pinhole, some.place)
@@ -160,55 +155,21 @@ def reflected(
 
     That is the area that a unit of solid angle of the pinhole falls on, across the ray, mm2, (k,).
     With the curvatures 1/s + 2/(r cos i) in the plane of incidence and 1/s + 2 cos i/r across it,
-    of light that has gone s from the pinhole, it is s^2 (1 + t c1) (1 + t c2) after t more.
+    of light that has gone s from the pinhole, it is s^2 (1 + t c1) (1 + t c2) after t more. The
+    points are found as by `tbcad.core.optics.reflection.reflection_points`.
     """
     points, spread = np.empty_like(place), np.empty(len(place))
-    a = pinhole - centre
-    p = np.sqrt((a**2).sum())
+    middle, start = vector(centre), vector(pinhole)
     for k in range(len(place)):
-        b = place[k] - centre
-        q = np.sqrt((b**2).sum())
-        across = b - (a @ b) / p**2 * a
-        height = np.sqrt((across**2).sum())
-        turn = _turn(p, q, np.arctan2(height, (a @ b) / p), radius)
-        normal = np.cos(turn) * a / p
-        if height > 0:
-            normal += np.sin(turn) * across / height
-        points[k] = centre + radius * normal
-        to_pinhole, to_place = pinhole - points[k], place[k] - points[k]
-        s, t = np.sqrt((to_pinhole**2).sum()), np.sqrt((to_place**2).sum())
-        cosine = (normal @ to_pinhole) / s
+        normal = unit(minus(start, middle))
+        for _ in range(STEPS):
+            point = plus_scaled(middle, radius, normal)
+            to_pinhole, to_place = minus(start, point), minus(vector(place[k]), point)
+            s, t = np.sqrt(dot(to_pinhole, to_pinhole)), np.sqrt(dot(to_place, to_place))
+            bisector = plus_scaled(divided(to_pinhole, s), 1 / t, to_place)
+            normal = unit(plus_scaled(unit(bisector), radius / 2 * (1 / s + 1 / t), normal))
+        points[k, 0], points[k, 1], points[k, 2] = point
+        cosine = dot(normal, to_pinhole) / s
         within, aside = 1 / s + 2 / (radius * cosine), 1 / s + 2 * cosine / radius
         spread[k] = s**2 * (1 + t * within) * (1 + t * aside)
     return points, spread
-
-
-@compiled_loop
-def _turn(p: float, q: float, whole: float, radius: float) -> float:
-    """Angle at a circle's centre from the pinhole to the normal that reflects it, radians.
-
-    The angles of incidence and reflection differ by a sum that grows with the turn, from below zero
-    where the normal looks at the pinhole to above zero where it looks at the other point. Pinhole
-    and point are at p and q from the centre, mm, more than the radius, and `whole` apart, radians.
-    """
-    low, high = 0.0, whole
-    turn = whole / 2
-    for _ in range(STEPS):
-        x, y = turn, turn - whole
-        px, py = p * np.cos(x) - radius, q * np.cos(y) - radius
-        value = np.arctan2(p * np.sin(x), px) + np.arctan2(q * np.sin(y), py)
-        if value > 0:
-            high = turn
-        else:
-            low = turn
-        # d atan2(p sin x, p cos x - r) / dx
-        slope = p * (p - radius * np.cos(x)) / (px**2 + (p * np.sin(x)) ** 2)
-        slope += q * (q - radius * np.cos(y)) / (py**2 + (q * np.sin(y)) ** 2)
-        after = turn - value / slope
-        if not low <= after <= high:
-            after = (low + high) / 2
-        done = abs(after - turn) <= LAST_STEP * whole
-        turn = after
-        if done:
-            break
-    return turn

@@ -209,12 +209,6 @@ def seen_spots(frame: CameraFrame, scene: Scene) -> SeenSpots:
     return SeenSpots(pixel, Spots(*places), albedo)
 
 
-def transport(seen: SeenSpots, light: Light, lamp: int, rays: slice) -> Colours:
-    """Light (r, 3) along some of the rays from a lamp by its number."""
-    received = light(lamp, seen.spots.part(rays))
-    return np.asarray(seen.albedo[rays] * received[:, None], dtype=np.float32)
-
-
 def _write_camera(
     group: h5py.Group, seen: SeenSpots, light: Light, lamps: LampPlaces, progress: Progress
 ) -> None:
@@ -225,7 +219,9 @@ def _write_camera(
 
     def packed(item: tuple[int, slice]) -> bytes:
         k, part = item
-        return filtered_chunk(transport(seen, light, k, part).astype("<f2")[None], stored.chunks)
+        received = light(k, seen.spots.part(part))[:, None]
+        values = np.asarray(seen.albedo[part] * received, dtype=np.float32)
+        return filtered_chunk(values.astype("<f2")[None], stored.chunks)
 
     def begin(item: tuple[int, slice]) -> None:
         progress(f"camera {group.name[1:]}, lamp {lamps.name[item[0]]}")

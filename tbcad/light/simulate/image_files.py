@@ -1,38 +1,22 @@
 """Images as files, each replaced as a whole, and several side by side in one."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from tbcad.common.atomic_files import refuse_existing, replace_files
-from tbcad.errors import InputError
+from tbcad.common.atomic_files import replace_files
+from tbcad.common.figure_files import image_bytes
 from tbcad.types import Bytes
 
-STILL_SUFFIXES = (".png",)
 ANIMATED_SUFFIXES = (".gif", ".webp", ".png")
 LABEL_PX = 22
 GAP_PX = 4
 FRAME_MS = 120
-PNG_COMPRESSION = 3
-
-
-def check_image_path(
-    file: Path, force: bool = False, suffixes: Sequence[str] = STILL_SUFFIXES
-) -> None:
-    """Refuse a file that could not be written, before long work.
-
-    InputError: another kind of file, its folder does not exist, or the file exists.
-    """
-    if file.suffix.lower() not in suffixes:
-        raise InputError(f"{file}: name a file that ends in {' or '.join(suffixes)}")
-    if not file.parent.is_dir():
-        raise InputError(f"{file}: its folder does not exist: make it, or choose another")
-    if file.is_dir():
-        raise InputError(f"{file} is a folder: choose another name")
-    refuse_existing(file, force)
+quick_png = partial(image_bytes, compress_level=3)
 
 
 def write_images(images: Mapping[Path, Bytes]) -> None:
@@ -41,7 +25,7 @@ def write_images(images: Mapping[Path, Bytes]) -> None:
     InputError: the folder cannot be written.
     """
     folder = next(iter(images)).parent
-    replace_files(folder, {path.name: png_bytes(image) for path, image in images.items()})
+    replace_files(folder, {path.name: quick_png(image) for path, image in images.items()})
 
 
 def write_animation(path: Path, frames: Sequence[Bytes]) -> None:
@@ -75,10 +59,3 @@ def side_by_side(pictures: Mapping[str, Bytes]) -> Bytes:
 def difference(truth: Bytes, picture: Bytes) -> Bytes:
     """How far two pictures (h, w, 3) are apart, black where they are equal."""
     return np.abs(truth.astype(np.int16) - picture.astype(np.int16)).astype(np.uint8)
-
-
-def png_bytes(image: Bytes) -> bytes:
-    """A picture (h, w, 3), or grey (h, w), as a PNG file."""
-    data = BytesIO()
-    Image.fromarray(image).save(data, "png", compress_level=PNG_COMPRESSION)
-    return data.getvalue()

@@ -4,16 +4,14 @@ from base64 import b64encode
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from io import BytesIO
 from itertools import count
 from pathlib import Path
 from threading import Lock
-from typing import Literal
 
 import numpy as np
-from PIL import Image
 
 from tbcad.common.atomic_files import replace_files
+from tbcad.common.figure_files import image_bytes
 from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
 from tbcad.light.datasets.pictures import pinhole_pictures
@@ -30,7 +28,6 @@ from tbcad.light.viewer.page import Query, filled
 from tbcad.output.single_files import check_file
 from tbcad.types import Bytes, Progress
 
-MethodAtRest = Literal["nearest", "depth"]
 View = Callable[[Camera], Bytes]  # what makes the picture (h, w, 3) of a camera
 JPEG_QUALITY = 88
 # While the view moves, a lens has 9 pinholes instead of 69, at half the width and height.
@@ -100,7 +97,7 @@ class Renderer:
 
 
 def light_field_renderer(
-    tiles: MirrorTiles, method: MethodAtRest = "depth", progress: Progress = lambda _: None
+    tiles: MirrorTiles, method: str = "depth", progress: Progress = lambda _: None
 ) -> Renderer:
     """Of a light field, whose file stays open: makes the pictures of all its virtual cameras."""
     pictures, reach = pinhole_pictures(tiles.source, progress), tiles.source.capture_mm
@@ -118,9 +115,7 @@ def _of_field(made: Field, view: Camera, stride: float = STRIDE) -> Bytes:
     return field_picture(made, view, stride).image
 
 
-def _synthesised(
-    tiles: MirrorTiles, method: MethodAtRest, by_depth: Callable[[], DepthViews]
-) -> View:
+def _synthesised(tiles: MirrorTiles, method: str, by_depth: Callable[[], DepthViews]) -> View:
     if method == "depth":
         views = by_depth()
         return lambda view: views.of(view)[0].image
@@ -134,13 +129,6 @@ def capture_mm(pictured: MirrorTiles | Field) -> float:
     return pictured.source.capture_mm
 
 
-def image_bytes(image: Bytes, kind: str, **options: int) -> bytes:
-    """An image (h, w, 3) as a file of a kind that Pillow writes."""
-    with BytesIO() as buffer:
-        Image.fromarray(np.ascontiguousarray(image)).save(buffer, kind, **options)
-        return buffer.getvalue()
-
-
 @dataclass(frozen=True)
 class Turntable:
     """Which pictures a turntable has."""
@@ -149,7 +137,7 @@ class Turntable:
     elevations_deg: tuple[float, ...]  # a row of views each
     distance: float  # of the camera from the middle of the object, mm
     size: tuple[int, int]  # columns and rows of a picture
-    method: MethodAtRest  # how those of a light field are made
+    method: str  # how they are made: nearest or depth, of a light field, or field
 
 
 def even_elevations(rows: int, middle_deg: float) -> tuple[float, ...]:

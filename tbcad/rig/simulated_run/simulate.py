@@ -236,4 +236,4 @@ def run_object(
     room = min(export.capture_mm, stage.object_diameter_mm, 2 * abs(stage.top_mm))
     if file is None:
         return built_in_object(room)
-    return load_object(Path(file), export.capture_mm, options, told)
+    return load_object(file, export.capture_mm, options, told)

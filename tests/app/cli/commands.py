@@ -1,6 +1,6 @@
 """All commands of tbcad with their options, as the command line knows them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any
 
@@ -9,6 +9,8 @@ import typer.main
 from tbcad.app.cli.app import app
 
 Words = tuple[str, ...]
+Command = Callable[..., Any]
+"""Runs a command of words, and gives what it prints as `out` and `err`."""
 
 
 @cache

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from tbcad_verify.report.text import MAX_LINES
 
-from tbcad.app.cli import run
 from tbcad.app.cli.endings import signals_as_interrupt
+from tests.app.cli.commands import Command
 from tests.exported_files import read_csv
 
 SHELL = ["--parts", "shell"]
@@ -20,32 +20,27 @@ WIDE = ["build", "--n", "6", "--set", "hfov_deg=110", *SENSOR, *SHELL]
 
 
 @pytest.mark.slow
-def test_build_verifies_and_verify_agrees(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_build_verifies_and_verify_agrees(tmp_path: Path, cli: Command) -> None:
     """The camera of the paper does not hold the mirrors of n = 6; a wider one does."""
     out = tmp_path / "exports"
-    code = run([*WIDE, "--out", str(out)])
-    shown = capsys.readouterr()
-    assert code == 0, shown.out
+    shown = cli(*WIDE, "--out", out)
     assert shown.out.startswith("PASS: ")
     assert "Can be made (" in shown.out
     assert len(shown.out.splitlines()) <= MAX_LINES
     assert "Traceback" not in shown.err
     verified = (out / "verify.json").read_bytes()
     assert json.loads(verified)["pass"] is True
-    assert run(["verify", str(out)]) == 0
+    cli("verify", out)
     assert (out / "verify.json").read_bytes() == verified
 
 
 @pytest.mark.slow
 def test_failed_verification_keeps_the_files_and_names_mirrors(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, cli: Command
 ) -> None:
     out = tmp_path / "paper"
     paper = ["--n", "9", "--radius-rule", "paper", *SENSOR]
-    assert run(["build", *paper, *SHELL, "--out", str(out)]) == 1
-    shown = capsys.readouterr().out
+    shown = cli("build", *paper, *SHELL, "--out", out, code=1).out
     assert shown.startswith("FAIL: ")
     assert "virtual cameras see less than 60 mm" in shown
     assert "coverage, facets" in shown

@@ -14,9 +14,8 @@ import tbcad_verify
 from tbcad_verify.report.methods import method_of
 
 import tbcad.app.cli  # noqa: F401 - adds all commands
-from tbcad.app.cli import run
 from tbcad.app.cli.help_texts import HEADINGS, examples
-from tests.app.cli.commands import Words, commands, leaves, long_name, options
+from tests.app.cli.commands import Command, Words, commands, leaves, long_name, options
 
 WIDE = "2000"  # columns: no line of help is broken
 ALL = commands()
@@ -42,11 +41,10 @@ def plain(text: str) -> str:
 
 @pytest.mark.parametrize("words", ALL, ids=" ".join)
 def test_screen_shows_every_word_and_the_examples(
-    words: Words, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    words: Words, monkeypatch: pytest.MonkeyPatch, cli: Command
 ) -> None:
     monkeypatch.setenv("COLUMNS", WIDE)
-    assert run([*words, "-h"]) == 0
-    shown = " ".join(capsys.readouterr().out.split())
+    shown = " ".join(cli(*words, "-h").out.split())
     assert shown.startswith(" ".join(["Usage: tbcad", *words]))
     for text in (ALL[words].help, *(one.help for one in ALL[words].params)):
         for paragraph in (text or "").split("\n\n"):
@@ -58,11 +56,8 @@ def test_screen_shows_every_word_and_the_examples(
         assert f"{f'tbcad {command} {example}'.strip()} - {about}" in shown.partition("Examples")[2]
 
 
-def test_commands_are_under_headings_in_the_order_of_the_work(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert run(["--help"]) == 0
-    shown = capsys.readouterr().out
+def test_commands_are_under_headings_in_the_order_of_the_work(cli: Command) -> None:
+    shown = cli("--help").out
     places = [shown.index(f"─ {title} ─") for title in HEADINGS]
     assert places == sorted(places)
     assert {name for names in HEADINGS.values() for name in names} == {
@@ -86,36 +81,35 @@ def test_an_option_is_called_and_takes_the_same_everywhere() -> None:
     assert {"--timeout", "--time-limit", "--for-process", "--process"} <= spelled  # old names
 
 
-def test_a_study_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    assert run(["study", "elevation", "--set", "n=4", "--json", "--out", str(tmp_path)]) == 0
-    record: dict[str, Any] = json.loads(capsys.readouterr().out)
+def test_a_study_as_json(cli: Command, tmp_path: Path) -> None:
+    words = ("study", "elevation", "--set", "n=4", "--json", "--out", tmp_path)
+    record: dict[str, Any] = json.loads(cli(*words).out)
     assert record["study"] == "elevation"
     assert {Path(file) for file in record["files"]} == set(tmp_path.iterdir())
     assert {"quantity", "unit", "value", "paper", "where"} == set(record["figures"][0])
 
 
-def explain(capsys: pytest.CaptureFixture[str], *words: str) -> str:
-    assert run(["explain", *words]) == 0
-    shown = capsys.readouterr()
+def explain(cli: Command, *words: str) -> str:
+    shown = cli("explain", *words)
     assert not shown.err
     assert "--json" in words or max(map(len, shown.out.splitlines())) <= 80
-    return shown.out
+    return str(shown.out)
 
 
-def found(capsys: pytest.CaptureFixture[str], name: str) -> dict[str, dict[str, object]]:
-    record = json.loads(explain(capsys, name, "--json"))
+def found(cli: Command, name: str) -> dict[str, dict[str, object]]:
+    record = json.loads(explain(cli, name, "--json"))
     assert record["schema"] == "tbcad-explain/1"
     return {f"{one['kind']} {one['name']}": one for one in record["found"]}
 
 
 @pytest.mark.parametrize("name", ["theta1", "theta_1", "THETA1", "θ₁", "theta1_deg"])
-def test_a_symbol(capsys: pytest.CaptureFixture[str], name: str) -> None:
-    text = explain(capsys, name)
+def test_a_symbol(cli: Command, name: str) -> None:
+    text = explain(cli, name)
     for part in ("θ₁ = atan(", "rad", "eq. 1", "required_angles", "mirrors.csv"):
         assert part in text
 
 
-def test_keys_sections_and_checks_by_all_their_names(capsys: pytest.CaptureFixture[str]) -> None:
+def test_keys_sections_and_checks_by_all_their_names(cli: Command) -> None:
     for name, expected in {
         "margin_mm": {"key mirrors.margin_mm"},
         "stage": {"term stage", "section prototype.stage"},
@@ -123,11 +117,11 @@ def test_keys_sections_and_checks_by_all_their_names(capsys: pytest.CaptureFixtu
         "coverage facets": {"check coverage, facets"},
         "mirrors off": {"check centre error"},  # as the summary calls it
     }.items():
-        assert found(capsys, name).keys() == expected
-    key = found(capsys, "mirrors.margin_mm")["key mirrors.margin_mm"]
+        assert found(cli, name).keys() == expected
+    key = found(cli, "mirrors.margin_mm")["key mirrors.margin_mm"]
     assert (key["type"], key["default"], key["unit"]) == ("number", "0.6", "mm")
     assert key["allowed"] == "a number from 0 to 20"
-    check = found(capsys, "coverage, facets")["check coverage, facets"]
+    check = found(cli, "coverage, facets")["check coverage, facets"]
     assert "pinhole -> outline" in str(check["compares"])
     assert check["tolerance"] == "target"
     assert check["if it fails"]
@@ -148,11 +142,11 @@ def test_every_check_is_known() -> None:
     assert {name for name in every_check() if method_of(name) is None} == set()
 
 
-def test_alone_it_lists_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
-    text = explain(capsys)
+def test_alone_it_lists_what_there_is(cli: Command) -> None:
+    text = explain(cli)
     for part in ("θ₁", "[prototype.base]", "margin_mm", "coverage, facets"):
         assert part in text
-    listed = json.loads(explain(capsys, "--json"))
+    listed = json.loads(explain(cli, "--json"))
     assert {"term", "section", "key", "check"} <= set(listed)
     for name in (*listed["term"], *listed["key"], *listed["check"])[::20]:
-        assert found(capsys, name)
+        assert found(cli, name)

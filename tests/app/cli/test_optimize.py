@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 import tbcad
-from tbcad.app.cli import run
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.load import load_spec, shipped_designs
 from tbcad.errors import InputError
 from tbcad.optimizing import search as search_module
 from tbcad.optimizing.candidate import DesignCandidate, Figures, MachineLimits, Place
+from tests.app.cli.commands import Command
 from tests.exported_files import read_csv
 
 
@@ -25,18 +25,16 @@ def closed_form(
 
 
 @pytest.fixture(autouse=True)
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+def quick(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(search_module, "evaluate", closed_form)
 
 
-def words(tmp_path: Path, *more: str) -> list[str]:
-    out = str(tmp_path / "found" / "better.toml")
-    return ["optimize", "--set", "n=4", "--candidates", "80", "--out", out, *more]
+WORDS = ("optimize", "--set", "n=4", "--candidates", "80", "--out", "found/better.toml")
 
 
-def test_design_table_and_plot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(words(tmp_path)) == 0
-    folder = tmp_path / "found"
+def test_design_table_and_plot(cli: Command) -> None:
+    printed, folder = cli(*WORDS).out, Path("found")
     names = {"better.toml", "better-candidates.csv", "better-candidates.jsonl", "better.png"}
     assert {file.name for file in folder.iterdir()} == names
     table = tomllib.loads((folder / "better.toml").read_text(encoding="utf-8"))
@@ -44,14 +42,12 @@ def test_design_table_and_plot(tmp_path: Path, capsys: pytest.CaptureFixture[str
     best = max(float(row["semi_minor_mm"]) for row in rows)
     assert table["optics"]["semi_minor_mm"] == best > 100
     assert float(rows[0]["semi_minor_mm"]) == 100
-    printed = capsys.readouterr().out
     assert "pixels, minimum                    100" in printed
     assert len(printed.splitlines()) <= 12
 
 
-def test_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(words(tmp_path, "--json", "--for", "minimum")) == 0
-    result = json.loads(capsys.readouterr().out)
+def test_json(cli: Command) -> None:
+    result = json.loads(cli(*WORDS, "--json", "--for", "minimum").out)
     assert result["before"]["place"] == [100, -100, 100, 1, 1]
     assert result["after"]["figures"]["minimum_px"] > 100
     assert result["after"] in result["front"]
@@ -73,9 +69,7 @@ def test_in_python(tmp_path: Path) -> None:
         tbcad.optimize(candidates=3)
 
 
-def test_a_search_that_was_stopped_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_search_that_was_stopped_goes_on(monkeypatch: pytest.MonkeyPatch, cli: Command) -> None:
     def stopped(
         spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
     ) -> DesignCandidate:
@@ -84,31 +78,25 @@ def test_a_search_that_was_stopped_goes_on(
         return closed_form(spec, ssim_within, place)
 
     monkeypatch.setattr(search_module, "evaluate", stopped)
-    assert run(words(tmp_path)) == 130
+    cli(*WORDS, code=130)
     monkeypatch.setattr(search_module, "evaluate", closed_form)
-    assert run(words(tmp_path)) == 2
-    assert "go on with --resume, or begin anew with --force" in capsys.readouterr().err
-    assert run(words(tmp_path, "--resume")) == 0
+    said = cli(*WORDS, code=2).err
+    assert "go on with --resume, or begin anew with --force" in said
+    cli(*WORDS, "--resume")
 
 
-@pytest.fixture(autouse=True)
-def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
-def test_init_writes_the_papers_design(tmp_path: Path) -> None:
-    (tmp_path / "my.toml").write_text("mine", encoding="utf-8")
-    assert run(["init", "my.toml", "--force"]) == 0
+def test_init_writes_the_papers_design(cli: Command) -> None:
+    Path("my.toml").write_text("mine", encoding="utf-8")
+    cli("init", "my.toml", "--force")
     assert load_spec(Path("my.toml")) == load_spec(None)
 
 
-def test_lists_the_designs(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["init", "--list"]) == 0
-    text = capsys.readouterr().out
+def test_lists_the_designs(cli: Command) -> None:
+    text = cli("init", "--list").out
     assert text.startswith("turtleback: The design of the paper")
     assert "mukaigawa-flat: " in text
-    assert run(["init", "--list", "--json"]) == 0
-    assert len(json.loads(capsys.readouterr().out)["designs"]) == len(shipped_designs())
+    listed = json.loads(cli("init", "--list", "--json").out)
+    assert len(listed["designs"]) == len(shipped_designs())
 
 
 def test_a_file_is_preferred_to_a_design_of_its_name() -> None:

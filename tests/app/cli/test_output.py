@@ -16,6 +16,7 @@ from tbcad.app.cli.app import _show
 from tbcad.app.doctor import Finding
 from tbcad.common.results import Figure, Study
 from tbcad.common.screen import WIDTH, TimeLeft, stages
+from tests.app.cli.commands import Command
 from tests.exported_files import contents
 
 SMALL = ["build", "--n", "4", "--set", "hfov_deg=120", "--parts", "shell"]
@@ -38,31 +39,23 @@ def fits(text: str) -> list[str]:
     return lines
 
 
-def test_outputs_of_verify(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_outputs_of_verify(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Command) -> None:
     shutil.copytree(SAMPLE, tmp_path / "x")
     monkeypatch.chdir(tmp_path)
-    assert run(["verify", "x", "--quiet"]) == 0
-    quiet = capsys.readouterr()
+    quiet = cli("verify", "x", "--quiet")
     assert quiet.err == ""
     assert quiet.out == "PASS: as designed, 89 virtual cameras see 20 mm or more\n"
-    assert run(["verify", "x", "--full"]) == 0
-    full = capsys.readouterr().out
+    full = cli("verify", "x", "--full").out
     assert quiet.out in full
     assert "object clearance" in "\n".join(fits(full))
     assert "parts can be made" in full
 
 
-def test_doctor_fits_and_shows_every_word(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_doctor_fits_and_shows_every_word(monkeypatch: pytest.MonkeyPatch, cli: Command) -> None:
     detail, remedy = "cadquery-ocp and cadquery-ocp-novtk [both] " * 5, "pip uninstall -y x " * 9
-    monkeypatch.setattr(
-        "tbcad.app.doctor.diagnose", lambda: [Finding("kernel", False, detail, remedy)]
-    )
-    assert run(["doctor"]) == 1
-    words = " ".join(fits(capsys.readouterr().out)).split()
+    found = [Finding("kernel", False, detail, remedy)]
+    monkeypatch.setattr("tbcad.app.doctor.diagnose", lambda: found)
+    words = " ".join(fits(cli("doctor", code=1).out)).split()
     assert words == ["NO", "kernel", *detail.split(), "->", *remedy.split()]
 
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from tbcad.app.cli import run
 from tbcad.core.camera.sheet import CAMERA_COLUMNS
 from tbcad.prototype.files.bom import COLUMNS
 from tbcad.prototype.purchased.parts import PRICE_FIELDS as PRICE_FILE
+from tests.app.cli.commands import Command
 
 ROWS = (
     *(["1", "2", "608-2Z", "bearing (ISO 15)", "ISO 15", "steel", "12.0", "24.0", "", "", ""],),
@@ -36,26 +36,23 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_sums_come_first(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["parts", str(folder)]) == 0
-    first, second, third, fourth, _, *rows = lines = capsys.readouterr().out.splitlines()
+def test_sums_come_first(folder: Path, cli: Command) -> None:
+    first, second, third, fourth, _, *rows = lines = cli("parts", folder).out.splitlines()
     assert first == "2 kinds of parts to buy: 3 EUR, 1 of them without a price"
     assert second == "1 parts to print: 0.2 kg of filament, 6 EUR, 25 h (1.0 days)"
     assert third.startswith("0.7 kg in all")
     assert fourth.startswith("not in the list: camera, lens")
     assert [row.split()[2] for row in rows] == ["carrier", "608-2Z", "MOTOR"]  # the dearest first
     assert all(len(line) <= 80 for line in lines)
-    assert run(["parts", str(folder), "--full"]) == 0
-    rows = capsys.readouterr().out.splitlines()[5:]
+    rows = cli("parts", folder, "--full").out.splitlines()[5:]
     assert [row.split()[0] for row in rows] == ["1", "2", "3"]  # as in the list
 
 
-def test_ones_own_prices(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ones_own_prices(folder: Path, cli: Command) -> None:
     mine = folder / "mine.csv"
     mine.write_text(",".join(PRICE_FILE) + "\nMOTOR,20,,USD,2026-10,shop\nPETG,,40,USD,2026-10,s\n")
     before = (folder / "bom.csv").read_bytes()
-    assert run(["parts", str(folder), "--json", "--prices", str(mine)]) == 0
-    record = json.loads(capsys.readouterr().out)
+    record = json.loads(cli("parts", folder, "--json", "--prices", mine).out)
     assert record["totals"]["bought_price"] == {"EUR": 3.0, "USD": 20.0}
     assert record["totals"]["filament_price"] == {"USD": 10.0}
     assert record["totals"]["without_price"] == 0
@@ -63,7 +60,7 @@ def test_ones_own_prices(folder: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert (folder / "bom.csv").read_bytes() == before
 
 
-def test_a_broken_list(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_broken_list(folder: Path, cli: Command) -> None:
     path = folder / "bom.csv"
     text = path.read_text()
     for old, new, message in (
@@ -73,43 +70,40 @@ def test_a_broken_list(folder: Path, capsys: pytest.CaptureFixture[str]) -> None
         ("item", "number", "bom.csv, line 1: the columns must be item,quantity"),
     ):
         path.write_text(text.replace(old, new, 1))
-        assert message in refused(["parts", str(folder)], capsys)
+        assert message in refused(cli, "parts", folder)
 
 
-def test_lines_of_the_sheet(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["camera", "--n", "6"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_lines_of_the_sheet(cli: Command) -> None:
+    lines = cli("camera", "--n", "6").out.splitlines()
     assert "cameras do with a lens of the list" in lines[0]
     assert all(len(line) <= 80 for line in lines)
 
 
-def test_a_users_camera_is_a_candidate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_users_camera_is_a_candidate(tmp_path: Path, cli: Command) -> None:
     file = tmp_path / "mine.csv"
     file.write_text(",".join(CAMERA_COLUMNS) + "\nMine,Sony E,36,24,30000,20000,usb,me\n")
-    assert run(["camera", "--n", "6", "--cameras", str(file), "--json"]) == 0
-    record = json.loads(capsys.readouterr().out)
+    record = json.loads(cli("camera", "--n", "6", "--cameras", file, "--json").out)
     assert record["candidates"][0]["camera"] == "Mine"
     assert record["requirements"]["near_mm"] < record["requirements"]["far_mm"]
 
 
-def test_a_sensor_that_no_camera_has(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["camera", "--n", "6", "--set", "width_px=32768", "--set", "height_px=24000"]) == 1
-    out = capsys.readouterr().out
+def test_a_sensor_that_no_camera_has(cli: Command) -> None:
+    large = ("--set", "width_px=32768", "--set", "height_px=24000")
+    out = cli("camera", "--n", "6", *large, code=1).out
     assert out.startswith("no camera of the list does: ")
     assert "pixels across the mirrors" in out
 
 
-def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    assert run(arguments) == 2
-    shown = capsys.readouterr()
+def refused(cli: Command, *words: object) -> str:
+    shown = cli(*words, code=2)
     assert shown.out == ""
     assert shown.err.count("\n") == 1
-    return shown.err
+    return str(shown.err)
 
 
-def test_the_section_of_the_samples_shell(tmp_path: Path) -> None:
+def test_the_section_of_the_samples_shell(tmp_path: Path, cli: Command) -> None:
     """Its outline is as wide and high as that of the shell's mesh, cut in the same plane."""
-    assert run(["drawings", str(SAMPLE), "--only", "shell_a", "--out", str(tmp_path)]) == 0
+    cli("drawings", SAMPLE, "--only", "shell_a", "--out", tmp_path)
     space = ezdxf.readfile(tmp_path / "shell_a.dxf").modelspace()
     cut = trimesh.load_mesh(SAMPLE / "shell_a.stl").section([0, 1, 0], [0, 0, 0])
     low, high = cut.bounds[:, [0, 2]]
@@ -125,14 +119,10 @@ def test_the_section_of_the_samples_shell(tmp_path: Path) -> None:
     assert len(space.query('LINE[layer=="hatch"]')) > 20
 
 
-def test_the_optical_layout_of_the_sample(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_optical_layout_of_the_sample(tmp_path: Path, cli: Command) -> None:
     """Its foci, capture sphere and virtual cameras are the design's; never written twice."""
-    words = ["drawings", str(SAMPLE), "--only", "optical_layout", "--out", str(tmp_path), "--json"]
-    assert run(words) == 0
-    shown = json.loads(capsys.readouterr().out)
-    (sheet,) = shown["sheets"]
+    words = ["drawings", SAMPLE, "--only", "optical_layout", "--out", tmp_path]
+    (sheet,) = json.loads(cli(*words, "--json").out)["sheets"]
     assert sheet["files"] == ["optical_layout.pdf", "optical_layout.dxf"]
     space = ezdxf.readfile(tmp_path / "optical_layout.dxf").modelspace()
     design = json.loads((SAMPLE / "design.json").read_text())["spec"]["optics"]
@@ -161,4 +151,4 @@ def test_the_optical_layout_of_the_sample(
         "capture sphere <>": pytest.approx(design["capture_diameter_mm"]),
         "<>": pytest.approx(2 * x),
     }
-    assert refused(words[:-1], capsys).endswith("replace it with --force\n")
+    assert refused(cli, *words).endswith("replace it with --force\n")

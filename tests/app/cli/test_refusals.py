@@ -19,6 +19,10 @@ CASES = (Path(__file__).parent / "refusals.txt").read_text(encoding="utf-8")
 LAMP = "x_mm,y_mm,z_mm\n"
 GIVEN = {
     "old.png": "mine",
+    "old.npz": "mine",
+    "page/report.html": "<!doctype html>mine",
+    "broken/lightfield.h5": "no",
+    "folder.png/mine": "mine",
     "design.toml": "optics.n = 3\n",
     "mine.toml": 'based_on = "sla"\nball_grade = "G7"',
     "none.csv": LAMP,
@@ -62,7 +66,8 @@ def test_one_line_says_why_and_nothing_is_written(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for name, text in GIVEN.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_text(text, encoding="utf-8")
     os.link(Path(folders["BALL"]) / "lightfield.h5", "lightfield.npz")
     words, _, said = case.partition(" | ")
     for name, folder in folders.items():

@@ -1,6 +1,5 @@
 """tbcad show from the command line."""
 
-import csv
 import json
 import re
 import shutil
@@ -15,68 +14,35 @@ import numpy as np
 import pytest
 
 import tbcad
-from tbcad.app.cli import run
 from tbcad.output.manifest import REPORT_BEGIN
-from tests.exported_files import contents
-
-
-@pytest.fixture
-def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Addresses that the browser is to open."""
-    addresses = list[str]()
-    monkeypatch.setattr(webbrowser, "open", lambda address: addresses.append(address) or True)
-    return addresses
-
-
-@pytest.fixture
-def export(tmp_path: Path) -> Path:
-    (tmp_path / "report.html").write_text(REPORT_BEGIN + "<p>", encoding="utf-8")
-    return tmp_path
+from tests.app.cli.commands import Command
+from tests.exported_files import contents, read_csv
 
 
 def test_a_report_is_opened_or_named(
-    export: Path,
-    opened: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Command
 ) -> None:
-    assert run(["show", str(export)]) == 0
-    assert opened == [(export / "report.html").as_uri()]
-    assert capsys.readouterr().out == f"{export / 'report.html'}\n"
-    assert run(["show", str(export), "--no-open", "--json"]) == 0
+    opened, page = list[str](), tmp_path / "report.html"
+    page.write_text(REPORT_BEGIN + "<p>", encoding="utf-8")
+    monkeypatch.setattr(webbrowser, "open", lambda address: opened.append(address) or True)
+    assert cli("show", tmp_path).out == f"{page}\n"
+    assert opened == [page.as_uri()]
+    assert json.loads(cli("show", tmp_path, "--no-open", "--json").out) == {"report": str(page)}
     assert len(opened) == 1
-    assert json.loads(capsys.readouterr().out) == {"report": str(export / "report.html")}
     monkeypatch.setattr(webbrowser, "open", lambda _: False)
-    assert run(["show", str(export)]) == 0
-    assert "no browser was found: open this address in one" in capsys.readouterr().err
-
-
-def refused(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["show", *arguments]) == 2
-    error = capsys.readouterr().err
-    assert words in error
-    assert error.count("\n") == 1
-
-
-def test_what_is_not_by_tbcad(export: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (export / "report.html").write_text("<!doctype html>mine", encoding="utf-8")
-    refused([str(export)], "report.html is not by tbcad: move it", capsys)
-    (export / "lightfield.h5").write_bytes(b"no")
-    refused([str(export), "--no-open"], "is no light field", capsys)
+    assert "no browser was found: open this address in one" in cli("show", tmp_path).err
 
 
 def test_a_turntable_is_written_and_not_replaced(
-    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    captured: Path, tmp_path: Path, cli: Command
 ) -> None:
     file = tmp_path / "knot.html"
-    words = [str(captured), "--turntable", str(file), "--frames", "4", "--rows", "2"]
+    words = ["show", captured, "--turntable", file, "--frames", "4", "--rows", "2"]
     words += ["--width", "64", "--height", "48"]
-    assert run(["show", *words, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    told = json.loads(cli(*words, "--json").out)
     assert told == {"turntable": str(file), "bytes": file.stat().st_size, "views": 8}
-    refused(words, "exists", capsys)
-    assert run(["show", *words, "--force"]) == 0
-    assert "8 views by method depth, 0.0 MB" in capsys.readouterr().out
+    assert "exists" in cli(*words, code=2).err
+    assert "8 views by method depth, 0.0 MB" in cli(*words, "--force").out
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is sent otherwise")
@@ -101,28 +67,21 @@ def test_a_light_field_is_served_until_ctrl_c(captured: Path) -> None:
 
 
 @pytest.mark.parametrize("target", ["nerfstudio", "colmap", "ngp-rays", "rays"])
-def test_the_same_bytes_again(captured: Path, tmp_path: Path, target: str) -> None:
-    export = ["export", str(captured), "--to", target, "--every", "20", "--out"]
-    assert run([*export, str(tmp_path / "one")]) == 0
-    assert run([*export, str(tmp_path / "other")]) == 0
-    assert contents(tmp_path / "one") == contents(tmp_path / "other")
-    assert run([*export, str(tmp_path / "one")]) == 0  # replaced, folders and all
+def test_the_same_bytes_again(captured: Path, tmp_path: Path, target: str, cli: Command) -> None:
+    for name in ("one", "other", "one"):  # replaced, folders and all
+        cli("export", captured, "--to", target, "--every", "20", "--out", tmp_path / name)
     assert contents(tmp_path / "one") == contents(tmp_path / "other")
     listed = json.loads((tmp_path / "one" / "manifest.json").read_text())["files"]
     assert listed.keys() | {"manifest.json"} == contents(tmp_path / "one").keys()
 
 
-def test_prints_what_is_in_the_record(
-    captured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    export = ["export", str(captured), "--to", "colmap", "--every", "9", "--size", "48"]
-    assert run([*export, "--out", str(tmp_path / "data"), "--json"]) == 0
-    printed = json.loads(capsys.readouterr().out)
-    record = json.loads((tmp_path / "data" / "dataset.json").read_text())
-    assert printed == record
+def test_prints_what_is_in_the_record(captured: Path, tmp_path: Path, cli: Command) -> None:
+    out = tmp_path / "data"
+    export = ["export", captured, "--to", "colmap", "--every", "9", "--size", "48", "--out", out]
+    record = json.loads(cli(*export, "--json").out)
+    assert record == json.loads((out / "dataset.json").read_text())
     assert record["size_px"] == 48
-    with (tmp_path / "data" / "cameras.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = read_csv(out / "cameras.csv")
     assert len(rows) == record["virtual_cameras"]
     for column, name in (
         ("rms_mm", "rms_distance_from_common_point_mm"),
@@ -133,8 +92,7 @@ def test_prints_what_is_in_the_record(
         values = np.array([float(row[column]) for row in rows])
         figures = record["fit"][name]
         assert [np.median(values), values.max()] == pytest.approx([*figures.values()], abs=1e-5)
-    assert run([*export, "--out", str(tmp_path / "data")]) == 0
-    said = capsys.readouterr().out
+    said = cli(*export).out
     assert said.startswith(f"{len(rows)} virtual cameras, 48 x 48 pixels each\n")
     assert f"{record['reprojection_error_px']['median']:.3f} pixels off" in said
 
@@ -165,22 +123,10 @@ def test_real_captures_come_without_the_object(captured: Path, tmp_path: Path) -
     assert by_file == figures
 
 
-def test_a_capture_is_not_replaced_by_its_export(
-    captured: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(captured.parent)
-    before = contents(captured)
-    for name in (str(captured), "knot/lightfield.h5"):
-        assert run(["export", name, "--to", "rays", "--out", "knot"]) == 2
-        assert "is read by this command" in capsys.readouterr().err
-    assert contents(captured) == before
-
-
-def test_captures_by_the_prototype(export_folder: Path, tmp_path: Path) -> None:
+def test_captures_by_the_prototype(export_folder: Path, tmp_path: Path, cli: Command) -> None:
     """Both write the same kind of light field, in which a mirror may have no pixels."""
-    capture = ["capture", str(export_folder), "--out"]
-    assert run([*capture, str(tmp_path / "balls"), "--prototype"]) == 0
-    assert run([*capture, str(tmp_path / "shell")]) == 0
+    cli("capture", export_folder, "--out", tmp_path / "balls", "--prototype")
+    cli("capture", export_folder, "--out", tmp_path / "shell")
     balls, shell = (
         tbcad.export(tmp_path / name, "colmap", out=tmp_path / f"{name}-data", cameras="a")
         for name in ("balls", "shell")

@@ -13,6 +13,7 @@ from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.layout import prototype_layout
+from tests.app.cli.commands import Command
 from tests.exported_files import contents, read_csv
 from tests.prototype_exports import write_export, write_wind_up
 
@@ -112,12 +113,9 @@ class TestWritten:
         assert plain["worst_camera_mm"]["0.5"] < known["worst_camera_mm"]["0.5"] - 1
         assert known["pointing_mm"]["rms"] < 1e-6 < plain["pointing_mm"]["rms"]
 
-    def test_words_are_shown_and_written(
-        self, bare: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
+    def test_words_are_shown_and_written(self, bare: Path, tmp_path: Path, cli: Command) -> None:
         out = tmp_path / "out"
-        assert run(["tolerance", str(bare), *FEW, "--out", str(out)]) == 0
-        shown = capsys.readouterr().out
+        shown = cli("tolerance", bare, *FEW, "--out", out).out
         read = json.loads((out / "tolerance.json").read_text())
         assert " ".join(shown.split()).startswith(" ".join(read["summary"].split()))
         assert all(name in shown for name in FILES)
@@ -137,10 +135,10 @@ class TestWritten:
         assert contents(written) == before
 
 
-def test_planar_mirrors_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_planar_mirrors_are_refused(tmp_path: Path, cli: Command) -> None:
     """They have no centre that pictures of made machines could take."""
     (folder := tmp_path / "flat").mkdir()
     exported(folder, "n=4", "radius_rule=flat")
-    assert run(["tolerance", str(folder), *FEW, "--out", str(tmp_path / "out")]) == 2
-    assert "planar mirrors, whose tolerances cannot" in capsys.readouterr().err.splitlines()[-1]
+    said = cli("tolerance", folder, *FEW, "--out", tmp_path / "out", code=2).err
+    assert "planar mirrors, whose tolerances cannot" in said.splitlines()[-1]
     assert not (tmp_path / "out").exists()

@@ -1,6 +1,7 @@
 """tbcad view and show of captures with a field beside them, and of a field alone."""
 
 import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +9,9 @@ import pytest
 from PIL import Image
 
 import tbcad
-from tbcad.app.cli import run
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import LightField
+from tests.app.cli.commands import Command
 from tests.light.viewer.fields import CAPTURE_MM, COLOUR, RADIUS_MM, write_ball
 
 SMALL = ["--width", "160", "--height", "120"]
@@ -27,20 +28,10 @@ def folder(captured: Path, tmp_path: Path) -> Path:
     return copied
 
 
-def viewed(folder: Path, *more: str) -> int:
-    out = str(folder.parent / "v.png")
-    return run(["view", str(folder), *SMALL, "--force", "--out", out, *more])
-
-
-def middle(folder: Path) -> object:
-    return Image.open(folder.parent / "v.png").getpixel((80, 60))
-
-
-def refused(folder: Path, words: str, capsys: pytest.CaptureFixture[str], *more: str) -> None:
-    assert viewed(folder, *more) == 2
-    error = capsys.readouterr().err
-    assert words in error.splitlines()[-1]
-    assert not (folder.parent / "v.png").exists()
+@pytest.fixture
+def view(folder: Path, cli: Command) -> Command:
+    """View the capture with more options."""
+    return partial(cli, "view", folder, *SMALL, "--force", "--out", folder.parent / "v.png")
 
 
 def test_by_its_path_in_python(folder: Path, captured: Path) -> None:
@@ -57,7 +48,7 @@ def test_by_its_path_in_python(folder: Path, captured: Path) -> None:
         tbcad.view(folder.parent)
 
 
-def test_a_field_beside_the_capture(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_field_beside_the_capture(folder: Path, view: Command) -> None:
     """Shown by default and where it is asked for; other methods leave it alone."""
     for words, line in (
         ("", "method field: its file is in the capture's folder"),
@@ -65,20 +56,20 @@ def test_a_field_beside_the_capture(folder: Path, capsys: pytest.CaptureFixture[
         ("--method depth", "method depth: as --method says"),
         ("--method nearest", "method nearest: as --method says"),
     ):
-        assert viewed(folder, *words.split()) == 0
-        printed = capsys.readouterr()
-        assert line in printed.out.splitlines()
+        printed = view(*words.split())
+        assert [one for one in printed.out.splitlines() if one.startswith("method ")] == [line]
         assert "PSNR" in printed.out
         assert "warning" not in printed.err
-        assert (middle(folder) == COLOUR_8) == ("method field" in line)
+        middle = Image.open(folder.parent / "v.png").getpixel((80, 60))
+        assert (middle == COLOUR_8) == ("method field" in line)
 
 
-def test_depth_normals_and_opacity(folder: Path) -> None:
+def test_depth_normals_and_opacity(folder: Path, view: Command) -> None:
     """The ball's front is 15 mm in front of the middle, and faces the view at elevation 30."""
     names = {name: folder.parent / f"{name}.png" for name in ("depth", "normals", "opacity")}
     points = folder.parent / "points.ply"
-    options = [word for name, file in names.items() for word in (f"--{name}", str(file))]
-    assert viewed(folder, *options, "--depth", str(points)) == 0
+    options = [word for name, file in names.items() for word in (f"--{name}", file)]
+    view(*options, "--depth", points)
     depth, normals, opacity = (np.asarray(Image.open(file)) for file in names.values())
     assert depth.shape == opacity.shape == (120, 160)
     front = 1 + 65534 * (0.5 + RADIUS_MM / CAPTURE_MM)
@@ -90,32 +81,25 @@ def test_depth_normals_and_opacity(folder: Path) -> None:
     assert points.read_bytes().startswith(b"ply\n")
 
 
-def test_a_field_of_another_capture(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_field_of_another_capture(folder: Path, view: Command) -> None:
     """Refused when it is asked for; told and left alone when it is only beside the capture."""
     with LightField.open(folder) as source:
         other = LightField({"a": source.frames["a"]}, source.capture_mm, {})
         file = write_ball(other, folder)
     words = f"{file} is of another capture, or of an older one"
-    refused(folder, words, capsys, "--method", "field")
-    assert viewed(folder) == 0
-    printed = capsys.readouterr()
+    assert words in view("--method", "field", code=2).err.splitlines()[-1]
+    assert not (folder.parent / "v.png").exists()
+    printed = view()
     assert f"tbcad: warning: {words}" in printed.err
     assert "method depth: a blend at the depth that is found" in printed.out
 
 
-def test_turntables(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_turntables(folder: Path, cli: Command) -> None:
     """By a field beside the capture, and by a field alone: the same pictures and title."""
     pages = []
     for shown in (folder, folder / "field.npz"):
         file = folder.parent / f"{len(pages)}.html"
-        words = ["show", str(shown), "--turntable", str(file), "--frames", "4", "--rows", "1"]
-        assert run([*words, *SMALL]) == 0
-        assert "4 views by method field" in capsys.readouterr().out
+        words = ["show", shown, "--turntable", file, "--frames", "4", "--rows", "1", *SMALL]
+        assert "4 views by method field" in cli(*words).out
         pages.append(file.read_bytes())
     assert pages[0] == pages[1]
-    words = ["show", str(folder / "field.npz"), "--method", "nearest", "--no-open"]
-    assert run(words) == 2
-    assert "--method nearest is for a light field: leave it out" in capsys.readouterr().err
-    (folder / "field.npz").write_bytes(b"no")
-    assert run(["show", str(folder / "field.npz"), "--no-open"]) == 2
-    assert "is no field that tbcad wrote" in capsys.readouterr().err

@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 
 import tbcad.app.cli  # noqa: F401 - adds all commands
-from tbcad.app.cli import run
 from tbcad.errors import InputError
-from tests.app.cli.commands import Words, leaves, long_name, options
+from tests.app.cli.commands import Command, Words, leaves, long_name, options
 
 LEAKS = re.compile(
     r"Traceback|pydantic|typer|click|Value error|Input should|Invalid value|\bNone\b|Errno|"
@@ -48,11 +47,9 @@ def _no_work(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def refusal(words: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+def refusal(cli: Command, words: list[str]) -> str:
     """The one line of a command that ends with exit code 2."""
-    assert run(words) == 2
-    shown = capsys.readouterr()
-    line = shown.err.removeprefix(STAGE)
+    line: str = cli(*words, code=2).err.removeprefix(STAGE)
     assert ONE_LINE.fullmatch(line), line
     assert not LEAKS.search(line)
     return line
@@ -66,13 +63,11 @@ def call(words: Words, *more: str) -> list[str]:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_wrong_values_are_refused_in_our_words(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_values_are_refused_in_our_words(name: str, cli: Command) -> None:
     words, option = CASES[name]
     for value in VALUES:
-        refusal(call(words, f"{long_name(option)}={value}"), capsys)
-    line, kind = refusal(call(words, long_name(option), "foo"), capsys), option.type_descriptor
+        refusal(cli, call(words, f"{long_name(option)}={value}"))
+    line, kind = refusal(cli, call(words, long_name(option), "foo")), option.type_descriptor
     if kind.is_choice or kind.annotation in NUMBERS:
         assert line.startswith(f"tbcad: {long_name(option)} is 'foo', allowed is ")
         limits = (kind.parameter_info.min, kind.parameter_info.max)
@@ -81,9 +76,9 @@ def test_wrong_values_are_refused_in_our_words(
 
 
 @pytest.mark.parametrize("words", leaves(), ids=" ".join)
-def test_wrong_options_and_arguments(words: Words, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "--nonsense" in refusal(call(words, "--nonsense"), capsys)
-    assert "-Z" in refusal(call(words, "-Z"), capsys)
-    assert f"tbcad {' '.join(words)} --help" in refusal(call(words, "a", "b", "c"), capsys)
+def test_wrong_options_and_arguments(words: Words, cli: Command) -> None:
+    assert "--nonsense" in refusal(cli, call(words, "--nonsense"))
+    assert "-Z" in refusal(cli, call(words, "-Z"))
+    assert f"tbcad {' '.join(words)} --help" in refusal(cli, call(words, "a", "b", "c"))
     if call(words) != [*words]:
-        assert re.search("(FOLDER|RUN) is missing", refusal([*words], capsys))
+        assert re.search("(FOLDER|RUN) is missing", refusal(cli, [*words]))

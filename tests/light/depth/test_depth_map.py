@@ -78,12 +78,6 @@ def test_the_points_have_colours_but_for_the_background() -> None:
     assert (np.asarray(cloud.colors)[:, :3] == (200, 10, 30)).all()
 
 
-def test_a_view_that_looks_elsewhere_is_refused(tiles: MirrorTiles) -> None:
-    aside = Camera(VIEW.pinhole, VIEW.right, VIEW.forward, 40, 30, 0.5)
-    with pytest.raises(InputError, match="does not look at the object"):
-        depth_map(pinhole_pictures(tiles.source), aside)
-
-
 def test_views_are_as_good_as_with_the_true_surface_also_quick_ones(
     tiles: MirrorTiles, knot: Scene
 ) -> None:

@@ -9,6 +9,7 @@ from tbcad.light.reconstruction.field import Field, Grid
 from tbcad.light.reconstruction.marching import MATT
 from tbcad.light.reconstruction.rays import CapturedRays, entries
 from tbcad.types import Bools, Floats
+from tests.ray_fields import captured_along
 
 WIDTH_MM, NODES, RADIUS, STEEP = 20.0, 41, 7.0, 8.0
 COLOUR = (0.6, 0.3, 0.1)
@@ -51,14 +52,6 @@ def parallel_rays(
     entry, length = entries(origin, direction, capture_mm / 2)
     met = length > 0.05
     away = np.tile(np.hypot(x, y), len(u))
-    colour = np.where(bright(away)[:, None], np.float32(0.7), np.float32(0.0))
-    return CapturedRays(
-        entry[met],
-        direction[met].astype(np.float32),
-        length[met],
-        np.broadcast_to(colour, entry.shape)[met].astype(np.float32),
-        mirrors[met].astype(np.int32),
-        np.ones(int(met.sum()), dtype=np.float32),
-        np.zeros((1, 4, 3), dtype=np.float32),
-        capture_mm,
-    )
+    colour = np.broadcast_to(np.where(bright(away)[:, None], 0.7, 0.0), entry.shape)
+    columns = (column[met] for column in (entry, direction, length, colour, mirrors))
+    return captured_along(*columns, capture_mm=capture_mm)

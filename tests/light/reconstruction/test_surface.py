@@ -147,17 +147,12 @@ def test_a_mirrors_pixel_is_its_share_of_the_capture_sphere() -> None:
     assert resolved_mm(rays) == pytest.approx(WIDTH_MM / 40, rel=0.03)
 
 
-def test_fields_of_nothing_no_rays_and_levels_that_cannot_be_are_refused() -> None:
+def test_fields_of_nothing_are_refused() -> None:
     rays = parallel_rays(lambda away: away < 0)
     with pytest.raises(InputError, match="no surface at level 1 1/mm: nothing in it is denser"):
         field_mesh(nothing(), 1.0)
     with pytest.raises(InputError, match="no surface"):
         best_level(nothing(), rays, rays.mirror >= 0)
-    with pytest.raises(InputError, match="no ray is held out"):
-        best_level(ball(), rays, rays.mirror < 0)
-    for level in (0.0, 8.0, float("nan")):
-        with pytest.raises(InputError, match=r"allowed is 0\.01 to 6"):
-            field_mesh(ball(), level)
 
 
 @pytest.fixture(scope="module")

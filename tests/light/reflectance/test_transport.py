@@ -41,6 +41,7 @@ from tbcad.light.simulate.views.refocus import pinhole_picture
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.simulate.views.viewpoints import image_quality
 from tbcad.types import Floats
+from tests.app.cli.commands import Command
 
 UP = np.array([0.0, 0.0, 1.0])
 PINHOLE = np.array([100.0, 0.0, -100.0])
@@ -183,20 +184,17 @@ def test_what_a_mirror_sees_is_what_it_lights(field: LightField, scene: Scene) -
 
 
 def test_the_command_writes_projectors_and_relights(
-    record: Path, hdr: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    record: Path, hdr: Path, tmp_path: Path, cli: Command
 ) -> None:
     out = tmp_path / "thrown"
-    assert run(["capture", str(record), "--lights", "projectors", "--every", "40", "--out",
-                str(out)]) == 0  # fmt: skip
+    cli("capture", record, "--lights", "projectors", "--every", "40", "--out", out)
     with open_reflectance(out) as reflectance:
         assert reflectance.facts["light"] == "projectors"
         brightest = np.asarray(reflectance.transport["a"][:]).max(axis=(1, 2))
         assert (brightest > 0.05).all()
         assert brightest.max() < 10
-    capsys.readouterr()
-    options = ["--light", str(hdr), "--width", "64", "--height", "48", "--out"]
-    assert run(["view", str(out), *options, str(tmp_path / "lit.png")]) == 0
-    text = capsys.readouterr().out
+    size = ("--width", "64", "--height", "48")
+    text = cli("view", out, "--light", hdr, *size, "--out", tmp_path / "lit.png").out
     assert "SSIM" in text
     assert "same lamps" not in text
 
@@ -248,18 +246,15 @@ def test_views_are_like_ray_traced_ones(mirrors: Path, hdr: Path, scene: Scene) 
     assert itself.psnr_db > image_quality(truths[0], before).psnr_db + 3
 
 
-def test_the_command_and_python(
-    mirrors: Path, hdr: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_and_python(mirrors: Path, hdr: Path, tmp_path: Path, cli: Command) -> None:
     out = tmp_path / "v.png"
-    words = ["view", str(mirrors), *SMALL, "--light", str(hdr), "--out", str(out)]
-    assert run([*words, "--light-turn", "90"]) == 0
-    said = capsys.readouterr().out
+    words = ["view", mirrors, *SMALL, "--light", hdr, "--out", out]
+    said = cli(*words, "--light-turn", "90").out
     assert f"light {hdr}: by " in said
     assert "against the ray-traced picture" in said
     assert "lit by the same lamps" in said
     turned = np.asarray(Image.open(out))
-    assert run([*words, "--force"]) == 0
+    cli(*words, "--force")
     assert np.abs(np.asarray(Image.open(out)).astype(int) - turned).mean() > 1
     view = tbcad.view(tbcad.relight(mirrors, hdr), 20, 30, size=(64, 48), method="nearest")
     assert view.image.max() > 100

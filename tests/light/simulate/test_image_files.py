@@ -9,13 +9,10 @@ from PIL import Image, ImageSequence
 from scipy.ndimage import gaussian_filter
 from skimage.metrics import structural_similarity
 
-from tbcad.errors import InputError
 from tbcad.light.simulate.image_files import (
     ANIMATED_SUFFIXES,
-    check_image_path,
     difference,
     write_animation,
-    write_images,
 )
 from tbcad.light.simulate.parallel import first_then_threads, over_chunks
 from tbcad.light.simulate.views.viewpoints import (
@@ -25,15 +22,6 @@ from tbcad.light.simulate.views.viewpoints import (
 )
 
 RED, BLUE = (np.full((24, 32, 3), colour, dtype=np.uint8) for colour in ((255, 0, 0), (0, 0, 255)))
-
-
-def test_stills_are_read_back_and_repeat(tmp_path: Path) -> None:
-    noise = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
-    files = [tmp_path / "one.png", tmp_path / "two.png"]
-    write_images({files[0]: noise, files[1]: noise})
-    assert np.array_equal(np.asarray(Image.open(files[0])), noise)
-    assert files[0].read_bytes() == files[1].read_bytes()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.png", "two.png"]
 
 
 @pytest.mark.parametrize("suffix", ANIMATED_SUFFIXES)
@@ -49,23 +37,6 @@ def test_animations_run_forward_and_back(tmp_path: Path, suffix: str) -> None:
 def test_difference_has_no_sign() -> None:
     assert (difference(RED, BLUE) == [255, 0, 255]).all()
     assert np.array_equal(difference(RED, BLUE), difference(BLUE, RED))
-
-
-@pytest.mark.parametrize("name", ["a.jpg", "absent/a.png", "folder.png"])
-def test_image_paths_refused(tmp_path: Path, name: str) -> None:
-    (tmp_path / "folder.png").mkdir()
-    with pytest.raises(InputError, match=name):
-        check_image_path(tmp_path / name)
-
-
-def test_failed_writing_leaves_the_old_file(tmp_path: Path) -> None:
-    old = tmp_path / "b.png"
-    write_images({old: RED})
-    before = old.read_bytes()
-    with pytest.raises((InputError, TypeError)):
-        write_images({old: BLUE, tmp_path / "c.png": np.zeros((3, 3, 7), dtype=np.uint8)})
-    assert old.read_bytes() == before
-    assert [path.name for path in tmp_path.iterdir()] == ["b.png"]
 
 
 @pytest.mark.parametrize("level", [0, 90])

@@ -29,7 +29,6 @@ from tbcad.light.viewer.render import (
     BEGIN,
     KIND,
     WEBP_QUALITIES,
-    MethodAtRest,
     Turntable,
     field_renderer,
     smallest_loss,
@@ -54,9 +53,7 @@ def error(file: Path, row: int, column: int, image: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("method", ["nearest", "depth"])
-def test_views_are_those_of_the_library(
-    tiles: MirrorTiles, tmp_path: Path, method: MethodAtRest
-) -> None:
+def test_views_are_those_of_the_library(tiles: MirrorTiles, tmp_path: Path, method: str) -> None:
     file, told = tmp_path / "knot.html", list[str]()
     table = replace(TABLE, method=method)
     size = write_turntable(file, tiles, table, "knot", told.append)

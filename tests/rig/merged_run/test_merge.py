@@ -233,7 +233,7 @@ def test_one_run_of_two(setting: Setting) -> None:
     assert list(record["based_on"]) == list(field.frames) == ["a"]
     told = field.facts["ray_sigma_mm"]
     assert told == {"a": [0.05, *[None] * (len(field.frames["a"].u) - 1)]}
-    at = camera_around_object(0.0, 0.6, 640.0, CAPTURE_MM, (64, 64), None)
+    at = camera_around_object(0.0, 0.6, 640.0, CAPTURE_MM, (64, 64))
     assert synthesise(MirrorTiles(field), at).image.any()
 
 

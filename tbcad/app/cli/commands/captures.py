@@ -50,7 +50,7 @@ def capture(
         asked = replace(options, out=out, geometry=geometry).on(screen)
         photographs = photograph(asked)
         record = write_photographs(photographs, asked)
-    written = f"{photographs.subject.name} as camera_a.png, camera_b.png and lightfield.h5"
+    written = f"{photographs.scene.subject.name} as camera_a.png, camera_b.png and lightfield.h5"
     print_result(record, [*_capture_lines(record, out, frames), f"{out}: {written}"], json)
     return 0
 

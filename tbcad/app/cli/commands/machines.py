@@ -164,12 +164,7 @@ def as_built(options: AsBuiltOptions, json: JsonResult = False) -> int:
     give the scale and all figures.
     """
     record = on_screen(1, "as_built", options)
-    lines = (
-        f"{record['balls']} balls: centres off by {record['median_um']:.0f} micrometres (median), "
-        f"{record['largest_um']:.0f} at most",
-        f"{options.out}: as_built.step, deviations.csv, legend.png, as_built.json",
-    )
-    print_result(record, lines, json)
+    print_result(record, result_lines("as-built", out=options.out, **record), json)
     return 0
 
 

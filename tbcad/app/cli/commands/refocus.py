@@ -1,8 +1,7 @@
-"""Refocus a light field; the viewpoint, ground truth and files of all pictures from one."""
+"""Refocus a light field; the ground truth and files of all pictures from one."""
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,7 +16,6 @@ from tbcad.options.shared import (
     Distance,
     Elevation,
     ForceFile,
-    Fov,
     Height,
     OutPicture,
     Width,
@@ -25,68 +23,23 @@ from tbcad.options.shared import (
 
 if TYPE_CHECKING:
     from tbcad.core.optics.camera import Camera
-    from tbcad.light.reconstruction.field import Field
-    from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.scene.ray_casting import Scene
     from tbcad.types import Bytes
-
-WIDEST_DEG = 170
 
 
 def check_pictures(capture: Path, out: Path, force: bool, *inputs: Path | None) -> None:
     """Refuse, before any work, pictures that cannot be written, that exist, or that are read."""
-    from tbcad.light.simulate.image_files import check_image_path
+    from tbcad.light.simulate.capture.files import OBJECT
     from tbcad.output.single_files import check_file
 
-    compared = compared_files(out) if has_object(capture) else []
+    compared = compared_files(out) if (capture / OBJECT).is_file() else []
     for file in (out, *compared):
-        check_image_path(file, force)
-        check_file(file, force, (capture, *inputs))
+        check_file(file, force, (capture, *inputs), (".png",))
 
 
 def compared_files(out: Path) -> list[Path]:
     """The ground truth and the comparison that are written beside a picture."""
     return [out.with_name(f"{out.stem}-{what}{out.suffix}") for what in ("truth", "and-truth")]
-
-
-def has_object(capture: Path) -> bool:
-    """Whether a capture is simulated: real photographs come without the object."""
-    from tbcad.light.simulate.capture.files import OBJECT
-
-    return (capture / OBJECT).is_file()
-
-
-def viewpoint_of(
-    source: "LightField",
-    place: tuple[float, float, float],
-    size: tuple[int, int],
-    fov: float | None,
-) -> "Camera":
-    """The camera of a view: azimuth and elevation in degrees, distance in mm; columns and rows.
-
-    InputError: no light field shows what it would see, or its angle of view cannot be.
-    """
-    from math import radians
-
-    from tbcad.light.simulate.scene.rays import camera_around_object
-
-    azimuth, elevation, distance = place
-    if fov is not None and not 0 < fov < WIDEST_DEG:
-        raise InputError(f"--fov {fov:g} is no angle of view: allowed is above 0, below 170")
-    wide = None if fov is None else radians(fov)
-    return camera_around_object(
-        radians(azimuth), radians(elevation), distance, source.capture_mm, size, wide
-    )
-
-
-def scene_of(folder: Path) -> "Scene | None":
-    """The object of a simulated capture; None where there is none, as with real photographs."""
-    from tbcad.light.simulate.capture.files import read_object
-    from tbcad.light.simulate.scene.ray_casting import prepared_scene
-
-    if not has_object(folder):
-        return None
-    return prepared_scene(read_object(folder))
 
 
 def true_picture(scene: "Scene", at: "Camera", samples: int = 4) -> "Bytes":
@@ -117,55 +70,6 @@ def write_compared(
     typer.echo(f"{out}, {files[0].name}, {files[1].name}: written")
 
 
-Beside: TypeAlias = Sequence[tuple[str, Path]]
-"""Files beside a picture, each with what it shows and its option is called: depth, normals ..."""
-
-
-def check_beside(
-    beside: Beside, out: Path, method: str, force: bool, inputs: tuple[Path | None, ...]
-) -> None:
-    """Refuse, before any work, what cannot be written or what a method does not give."""
-    from tbcad.light.simulate.image_files import check_image_path
-    from tbcad.output.single_files import check_file
-
-    taken = [out, *compared_files(out)]
-    for what, file in beside:
-        if what == "depth" and method not in ("depth", "field"):
-            raise InputError(f"--depth {file}: no depth is looked for: add --method depth")
-        if what != "depth" and method != "field":
-            raise InputError(f"--{what} {file}: only a field has that: add --method field")
-        check_image_path(file, force, (".png", ".ply") if what == "depth" else (".png",))
-        check_file(file, force, inputs)
-        if file in taken:
-            raise InputError(f"--{what} {file}: another file of this command: choose another name")
-        taken.append(file)
-
-
-def write_beside(beside: Beside, contents: dict[str, Callable[[], bytes]]) -> None:
-    """Write files by what makes each: by what it shows, with the suffix."""
-    from tbcad.common.atomic_files import replace_files
-
-    for what, file in beside:
-        replace_files(file.parent, {file.name: contents[what + file.suffix.lower()]()})
-
-
-def field_view(made: "Field", at: "Camera", beside: Beside) -> "Bytes":
-    """The picture of a field (h, w, 3), and what else is asked for of it."""
-    from tbcad.light.depth.depth_map import depth_ply, depth_png
-    from tbcad.light.reconstruction import picture as pictures
-
-    picture = pictures.field_picture(made, at)
-    depth = picture.depth(at)
-    contents: dict[str, Callable[[], bytes]] = {
-        "depth.png": lambda: depth_png(depth, made.grid.width_mm),
-        "depth.ply": lambda: depth_ply(at, depth, picture.image),
-        "normals.png": lambda: pictures.normals_png(pictures.field_normals(made, at, picture)),
-        "opacity.png": lambda: pictures.opacity_png(picture),
-    }
-    write_beside(beside, contents)
-    return picture.image
-
-
 FocusOption = Annotated[float, typer.Option()]
 """Position of the focal plane: mm from the centre of the object toward the camera."""
 AllInFocusOption = Annotated[bool, typer.Option("--all-in-focus")]
@@ -191,7 +95,6 @@ def refocus(
     ] = 21,
     width: Width = 640,
     height: Height = 480,
-    fov: Fov = None,
     truth_samples: Annotated[
         int, typer.Option(min=1, max=100_000, help="Rays per pixel of the ray-traced lens.")
     ] = 256,
@@ -206,30 +109,28 @@ def refocus(
     if all_in_focus and sweep is not None:
         raise InputError("--all-in-focus has no focus to move: leave out --sweep")
     from tbcad.app.api.views import refocused
+    from tbcad.light.simulate.capture.files import captured_scene
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.capture.photograph import to_bytes
-    from tbcad.light.simulate.image_files import (
-        ANIMATED_SUFFIXES,
-        check_image_path,
-        write_animation,
-    )
+    from tbcad.light.simulate.image_files import ANIMATED_SUFFIXES, write_animation
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.light.simulate.views.refocus import ThinLens, lens_picture, refocus_sweep
+    from tbcad.light.viewer.page import Query
     from tbcad.output.single_files import check_file
 
     check_pictures(capture_folder, out, force)
     if sweep is not None:
-        check_image_path(sweep, force, ANIMATED_SUFFIXES)
-        check_file(sweep, force, (capture_folder,))
+        check_file(sweep, force, (capture_folder,), ANIMATED_SUFFIXES)
         if sweep in (out, *compared_files(out)):
             raise InputError(f"--sweep {sweep}: a picture of this command: choose another name")
+    place = Query(azimuth, elevation, distance, width=width, height=height)
     names = ("69 pinholes", "pinhole" if all_in_focus else "real lens")
     with stages(3 + (sweep is not None)) as screen, LightField.open(capture_folder) as source:
         screen.stage("light field")
-        at = viewpoint_of(source, (azimuth, elevation, distance), (width, height), fov)
+        at = place.camera(source.capture_mm)
         lens = ThinLens(aperture, focus)
         lens.check(at, source.capture_mm)
-        tiles, scene = MirrorTiles(source), scene_of(capture_folder)
+        tiles, scene = MirrorTiles(source), captured_scene(capture_folder)
         screen.stage(names[0])
         picture = refocused(tiles, at, lens, all_in_focus, screen.detail).image
         screen.stage(names[1])

@@ -2,7 +2,7 @@
 
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 
     from tbcad.light.reconstruction.field import Field
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-    from tbcad.light.viewer.page import Query
-    from tbcad.light.viewer.render import MethodAtRest, Renderer
+    from tbcad.light.viewer.render import Renderer, Turntable
 
 REPORT_FILE = "report.html"
 MAX_PORT = 65535
@@ -80,36 +79,41 @@ def show(
     from tbcad.light.viewer.page import Query
 
     start = Query(azimuth, elevation, distance, width=width, height=height)
+    from tbcad.light.viewer.render import (
+        Turntable,
+        capture_mm,
+        check_turntable_path,
+        even_elevations,
+    )
+
     if turntable is not None:
-        from tbcad.light.viewer.render import check_turntable_path
-
         check_turntable_path(turntable, force)
-    from tbcad.light.viewer.render import capture_mm
-
-    with _shown(file, method) as shown:
-        start.check(capture_mm(shown.pictured))
+    with _shown(file, method) as (pictured, tiles):
+        start.check(capture_mm(pictured))
+        how = (method or "depth") if pictured is tiles else "field"
         if turntable is not None:
-            return _write_turntable(shown, turntable, start, (frames, rows), json)
-        return _show_views(shown, start, http_port, open_page, json)
+            elevations = even_elevations(rows, elevation)
+            table = Turntable(frames, elevations, distance, (width, height), how)
+            return _write_turntable(turntable, pictured, table, _title(file), json)
+        from tbcad.light.viewer.server import ViewServer
 
-
-class _Shown(NamedTuple):
-    """What is shown."""
-
-    file: Path  # of the light field, or of a field without one
-    pictured: "MirrorTiles | Field"  # what views are made from
-    tiles: "MirrorTiles | None"  # the light field; None: there is a field alone
-    method: "MethodAtRest" = "depth"  # of views of a light field
-
-    @property
-    def how(self) -> str:
-        """The method of all views."""
-        return self.method if self.pictured is self.tiles else "field"
+        with ViewServer(_renderer(pictured, tiles, how), _title(file), start, http_port) as server:
+            told = f"{server.address} shows {file} by method {how}; Ctrl-C ends it"
+            print_result({"address": server.address}, [told], json)
+            if open_page:
+                _open(server.address)
+            try:
+                server.serve_forever()
+            except KeyboardInterrupt:
+                typer.echo("ended", err=True)
+    return 0
 
 
 @contextmanager
-def _shown(file: Path, method: "MethodAtRest | Literal['field'] | None") -> "Iterator[_Shown]":
-    """A light field, with the field that is asked for or beside it; or a field."""
+def _shown(
+    file: Path, method: str | None
+) -> "Iterator[tuple[MirrorTiles | Field, MirrorTiles | None]]":
+    """What views are made from, a light field or a field; and the light field, if there is one."""
     from tbcad.light.reconstruction.field import SUFFIX, read_field, wanted_field
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
@@ -117,13 +121,11 @@ def _shown(file: Path, method: "MethodAtRest | Literal['field'] | None") -> "Ite
     if file.suffix.lower() == SUFFIX:
         if method not in (None, "field"):
             raise InputError(f"--method {method} is for a light field: leave it out for {file}")
-        yield _Shown(file, read_field(file), None)
+        yield read_field(file), None
         return
     with LightField.open(file) as source:
         tiles = MirrorTiles(source)
-        made = wanted_field(method, file, source)
-        how: MethodAtRest = "depth" if method is None or method == "field" else method
-        yield _Shown(file, made or tiles, tiles, how)
+        yield wanted_field(method, file, source) or tiles, tiles
 
 
 def _show_report(folder: Path, open_page: bool, json: bool) -> int:
@@ -147,46 +149,30 @@ def _show_report(folder: Path, open_page: bool, json: bool) -> int:
     return 0
 
 
-def _show_views(shown: _Shown, start: "Query", port: int, open_page: bool, json: bool) -> int:
-    from tbcad.light.viewer.server import ViewServer
-
-    with ViewServer(_renderer(shown), _title(shown.file), start, port) as server:
-        told = f"{server.address} shows {shown.file} by method {shown.how}; Ctrl-C ends it"
-        print_result({"address": server.address}, [told], json)
-        if open_page:
-            _open(server.address)
-        try:
-            server.serve_forever()
-        except KeyboardInterrupt:
-            typer.echo("ended", err=True)
-    return 0
-
-
-def _renderer(shown: _Shown) -> "Renderer":
+def _renderer(
+    pictured: "MirrorTiles | Field", tiles: "MirrorTiles | None", method: str
+) -> "Renderer":
     from tbcad.light.reconstruction.field import Field
     from tbcad.light.viewer.render import field_renderer, light_field_renderer
 
-    if isinstance(shown.pictured, Field):
-        return field_renderer(shown.pictured, shown.tiles)
+    if isinstance(pictured, Field):
+        return field_renderer(pictured, tiles)
     with stages(1) as screen:
         screen.stage("pictures of the virtual cameras")
-        return light_field_renderer(shown.pictured, shown.method, screen.detail)
+        return light_field_renderer(pictured, method, screen.detail)
 
 
 def _write_turntable(
-    shown: _Shown, out: Path, start: "Query", views: tuple[int, int], json: bool
+    out: Path, pictured: "MirrorTiles | Field", table: "Turntable", title: str, json: bool
 ) -> int:
-    from tbcad.light.viewer.render import Turntable, even_elevations, write_turntable
+    from tbcad.light.viewer.render import write_turntable
 
-    columns, rows = views
-    elevations = even_elevations(rows, start.elevation)
-    size_px = start.width, start.height
-    table = Turntable(columns, elevations, start.distance, size_px, shown.method)
     with stages(1) as screen:
         screen.stage("turntable")
-        size = write_turntable(out, shown.pictured, table, _title(shown.file), screen.detail)
-    told = f"{out}: {columns * rows} views by method {shown.how}, {size / 1e6:.1f} MB"
-    print_result({"turntable": str(out), "bytes": size, "views": columns * rows}, [told], json)
+        size = write_turntable(out, pictured, table, title, screen.detail)
+    views = table.columns * len(table.elevations_deg)
+    told = f"{out}: {views} views by method {table.method}, {size / 1e6:.1f} MB"
+    print_result({"turntable": str(out), "bytes": size, "views": views}, [told], json)
     return 0
 
 

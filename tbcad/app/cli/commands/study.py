@@ -248,10 +248,10 @@ def _subject(
     object_file: Path | None, capture_mm: float, paint: PaintOption, up: UpOption, unit: UnitOption
 ) -> "SceneObject":
     """The object of a study; one line on stderr says how its file was taken."""
-    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_or_built_in
+    from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
 
     options = ObjectOptions(paint=paint, up=up, unit=unit)
-    return load_or_built_in(object_file, capture_mm, options, partial(typer.echo, err=True))
+    return load_object(object_file, capture_mm, options, partial(typer.echo, err=True))
 
 
 def _sensors(given: list[str] | None, spec: "Spec") -> tuple["Sensor", ...]:

@@ -1,22 +1,18 @@
 """Synthesise views from a light field."""
 
+from collections.abc import Callable, Sequence
 from functools import partial
 from math import isnan, radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import typer
 
 from tbcad.app.cli.app import app
 from tbcad.app.cli.commands.refocus import (
-    Beside,
-    check_beside,
     check_pictures,
-    field_view,
-    scene_of,
+    compared_files,
     true_picture,
-    viewpoint_of,
-    write_beside,
     write_compared,
 )
 from tbcad.common.screen import stages
@@ -29,7 +25,6 @@ from tbcad.options.shared import (
     Distance,
     Elevation,
     ForceFile,
-    Fov,
     Height,
     MethodOfView,
     OutPicture,
@@ -38,6 +33,7 @@ from tbcad.options.shared import (
 
 if TYPE_CHECKING:
     from tbcad.core.optics.camera import Camera
+    from tbcad.light.reconstruction.field import Field
     from tbcad.light.reflectance.environment import Environment
     from tbcad.light.reflectance.transport import Relit
     from tbcad.light.simulate.capture.light_field import LightField
@@ -92,7 +88,6 @@ def view(
     frame: FrameOption = None,
     width: Width = 640,
     height: Height = 480,
-    fov: Fov = None,
     force: ForceFile = False,
 ) -> int:
     """Synthesise the view of a camera anywhere around the object from a light field.
@@ -107,32 +102,37 @@ def view(
     by_default = method is None and light is None
     asked = "field" if by_default and of_field else method
     chosen = asked or "depth"
+    from tbcad.common.atomic_files import replace_files
     from tbcad.light.reconstruction.field import wanted_field
     from tbcad.light.reflectance.environment import read_environment
+    from tbcad.light.simulate.capture.files import captured_scene
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.capture.sequence import sequence_frame
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
     from tbcad.light.simulate.views.viewpoints import image_quality
+    from tbcad.light.viewer.page import Query
 
     check_pictures(capture_folder, out, force, light)
-    check_beside(beside, out, chosen, force, (capture_folder, light))
-    _check_light(light, light_turn, light_format, chosen)
-    if frame is not None and light is not None:
-        raise InputError("--frame has its own light: leave out --light")
+    _check_beside(beside, out, chosen, force, (capture_folder, light))
+    _check_light(light, light_turn, light_format, chosen, frame)
+    place = Query(azimuth, elevation, distance, width=width, height=height)
     wanted = None if light is None else read_environment(light, radians(light_turn), light_format)
     with stages(3) as screen, LightField.open(capture_folder) as stored:
         screen.stage("light field")
         source = stored if frame is None else sequence_frame(stored, capture_folder, frame)
-        at = viewpoint_of(source, (azimuth, elevation, distance), (width, height), fov)
-        scene, tiles = scene_of(capture_folder), MirrorTiles(source)
+        at = place.camera(source.capture_mm)
+        scene, tiles = captured_scene(capture_folder), MirrorTiles(source)
         relit = None if wanted is None else _relit(capture_folder, source, wanted)
         shown = tiles if relit is None else MirrorTiles(relit.field)
         made = wanted_field(asked if by_default else chosen, capture_folder, source, frame)
         screen.stage("view")
         if made is not None:
-            picture = field_view(made, at, beside)
+            picture, contents = _of_field(made, at)
         else:
-            picture = _view((tiles, shown), at, chosen, beside, screen.detail)
+            picture, contents = _of_light_field((tiles, shown), at, chosen, screen.detail)
+        for what, file in beside:
+            data = contents[what + file.suffix.lower()]()
+            replace_files(file.parent, {file.name: data})
         screen.stage("truth")
         turned = None if frame is None else (capture_folder, frame)
         truth, same_lamps = _truths(scene, at, turned, relit, wanted)
@@ -179,23 +179,67 @@ def _relit(folder: Path, source: "LightField", wanted: "Environment") -> "Relit"
         return relit(source, reflectance, wanted)
 
 
-def _check_light(light: Path | None, turn: float, kind: LightFormat | None, method: str) -> None:
+def _check_light(
+    light: Path | None, turn: float, kind: LightFormat | None, method: str, frame: int | None
+) -> None:
     if light is None and turn:
         raise InputError(f"--light-turn {turn:g} turns no light: add --light")
     if light is None and kind is not None:
         raise InputError(f"--light-format {kind} is of no light: add --light")
     if light is not None and method == "field":
         raise InputError(f"--light {light}: a field has its own light: leave out --method field")
+    if light is not None and frame is not None:
+        raise InputError("--frame has its own light: leave out --light")
 
 
-def _view(
-    fields: tuple["MirrorTiles", "MirrorTiles"],
-    at: "Camera",
+def _check_beside(
+    beside: Sequence[tuple[str, Path]],
+    out: Path,
     method: str,
-    beside: Beside,
-    progress: "Progress",
-) -> "Bytes":
-    """The picture by nearest rays or by depth, and files of the depth that is found for it.
+    force: bool,
+    inputs: tuple[Path | None, ...],
+) -> None:
+    """Refuse, before any work, what cannot be written or what a method does not give.
+
+    Each file beside the picture comes with what it shows, as its option is called: depth ...
+    """
+    from tbcad.output.single_files import check_file
+
+    taken = [out, *compared_files(out)]
+    for what, file in beside:
+        if what == "depth" and method not in ("depth", "field"):
+            raise InputError(f"--depth {file}: no depth is looked for: add --method depth")
+        if what != "depth" and method != "field":
+            raise InputError(f"--{what} {file}: only a field has that: add --method field")
+        check_file(file, force, inputs, (".png", ".ply") if what == "depth" else (".png",))
+        if file in taken:
+            raise InputError(f"--{what} {file}: another file of this command: choose another name")
+        taken.append(file)
+
+
+Contents: TypeAlias = dict[str, Callable[[], bytes]]
+"""What makes the files beside a picture, by what each shows and its suffix."""
+
+
+def _of_field(made: "Field", at: "Camera") -> tuple["Bytes", Contents]:
+    """The picture of a field (h, w, 3), and what else is known of it."""
+    from tbcad.light.depth.depth_map import depth_ply, depth_png
+    from tbcad.light.reconstruction import picture as pictures
+
+    picture = pictures.field_picture(made, at)
+    depth = picture.depth(at)
+    return picture.image, {
+        "depth.png": lambda: depth_png(depth, made.grid.width_mm),
+        "depth.ply": lambda: depth_ply(at, depth, picture.image),
+        "normals.png": lambda: pictures.normals_png(pictures.field_normals(made, at, picture)),
+        "opacity.png": lambda: pictures.opacity_png(picture),
+    }
+
+
+def _of_light_field(
+    fields: tuple["MirrorTiles", "MirrorTiles"], at: "Camera", method: str, progress: "Progress"
+) -> tuple["Bytes", Contents]:
+    """The picture by nearest rays or by depth, and the depth that is found for it.
 
     The fields are the light field, and the one of the same rays whose colours are shown.
     """
@@ -204,11 +248,9 @@ def _view(
 
     tiles, shown = fields
     if method == "nearest":
-        return synthesise(shown, at).image
+        return synthesise(shown, at).image, {}
     picture, found = depth_views(tiles, progress=progress).of(at, shown)
-    ply = partial(found.ply, picture.image)
-    write_beside(beside, {"depth.png": found.png, "depth.ply": ply})
-    return picture.image
+    return picture.image, {"depth.png": found.png, "depth.ply": partial(found.ply, picture.image)}
 
 
 tell_options(__name__)

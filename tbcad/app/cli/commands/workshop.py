@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from tbcad.app.cli.app import app, command, on_screen, print_json, print_result
+from tbcad.app.cli.app import app, command, on_screen, print_json, print_result, result_lines
 from tbcad.common.screen import stages
 from tbcad.options.builds import OrderOptions
 from tbcad.options.call import tell_options
@@ -61,17 +61,14 @@ def order(options: OrderOptions, json: JsonResult = False) -> int:
     the design. 1: it does not. 2: bad input.
     """
     out, record = Path(options.out), on_screen(0, "order", options)
-    chain, told = record["chain"], [f"{record['chain']['name']}: {record['chain']['verdict']}"]
-    for one in chain["figures"]:
-        limit = "any" if one["limit"] is None else f"{one['limit']:.3g} {one['unit']}"
-        told.append(f"  {one['name']}: {one['chain']:.3g} of {limit}: {one['verdict']}")
-    told += [
-        f"Shells at their limits show {record['simulated_minimum_mm']:.2f} of "
-        f"{record['target_mm']:g} mm (simulated).",
-        f"{out}: {', '.join(sorted(p.name for p in out.iterdir()))}",
+    figures = [
+        {"of": "any" if one["limit"] is None else f"{one['limit']:.3g} {one['unit']}", **one}
+        for one in record["chain"]["figures"]
     ]
+    files = ", ".join(sorted(file.name for file in out.iterdir()))
+    told = result_lines("order", figures=figures, out=out, written=files, record=record)
     print_result(record, told, json)
-    return 0 if chain["holds"] else 1
+    return 0 if record["chain"]["holds"] else 1
 
 
 PricesOption = Annotated[Path | None, typer.Option("--prices", metavar="FILE")]

@@ -20,6 +20,7 @@ from tbcad.light.simulate.capture.photograph import BAND_ROWS, CameraPhotographs
 from tbcad.light.simulate.image_files import write_images
 from tbcad.light.simulate.parallel import in_threads
 from tbcad.light.simulate.scene.object import SceneObject
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.types import Bytes, Ints
 
@@ -173,10 +174,8 @@ def write_object(path: Path, subject: SceneObject) -> None:
 
 
 def read_object(folder: Path) -> SceneObject:
-    """Read the object of a capture; InputError: there is none, or it is damaged."""
+    """Read the object of a capture, which is there; InputError: it is damaged."""
     path = folder / OBJECT
-    if not path.is_file():
-        raise InputError(f"{path} is not there: without it there is no ground truth")
     try:
         with zipfile.ZipFile(path) as packed:
             if sum(entry.file_size for entry in packed.infolist()) > MAX_OBJECT_BYTES:
@@ -187,6 +186,11 @@ def read_object(folder: Path) -> SceneObject:
         raise
     except Exception as error:  # zip and numpy raise many kinds, of sizes that lie too
         raise InputError(f"{path} is damaged: {error}: capture again") from error
+
+
+def captured_scene(folder: Path) -> Scene | None:
+    """The object of a simulated capture; None where there is none, as with real photographs."""
+    return prepared_scene(read_object(folder)) if (folder / OBJECT).is_file() else None
 
 
 def _subject(arrays: dict[str, Any]) -> SceneObject:

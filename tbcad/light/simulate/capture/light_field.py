@@ -24,15 +24,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.cad.formats.hdf5 import StoredGroup, opened_hdf5
-from tbcad.common.figure_files import png_bytes
+from tbcad.common.figure_files import image_bytes
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.surfaces import Surfaces
-from tbcad.errors import InputError
 from tbcad.light.simulate.capture.photograph import CENTRE, RowBand, seen_by, to_bytes
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import Shift, TracedRays, part_tracer, unit_directions
 from tbcad.light.simulate.scene.reflector import Reflector, reflectors
+from tbcad.options.checks import check_is_capture
 from tbcad.types import Bytes, Floats, Ints
 
 NAME = "lightfield.h5"
@@ -101,12 +101,8 @@ class LightField:
 
         InputError: it cannot be read, or is no light field of this schema.
         """
+        check_is_capture(Path(path))
         file = Path(path) / NAME if Path(path).is_dir() else Path(path)
-        if not file.is_file():
-            raise InputError(
-                f"{file}: no such file; give a light field: the folder that `tbcad capture` or "
-                "`tbcad merge` wrote, or its lightfield.h5"
-            )
         store, found = opened_hdf5(file, SCHEMA, "light field", "capture again", _read)
         return replace(found, _store=store)
 
@@ -149,7 +145,9 @@ class LightField:
         """What notebooks show: the photographs side by side."""
         images = [frame.image() for frame in self.frames.values()]
         rows = min(len(image) for image in images)
-        return png_bytes(np.concatenate([image[:rows] for image in images], axis=1), SHOWN_PX)
+        whole = np.concatenate([image[:rows] for image in images], axis=1)
+        step = -(-max(whole.shape) // SHOWN_PX)
+        return image_bytes(whole[::step, ::step])
 
 
 def band_arrays(band: RowBand) -> dict[str, NDArray[Any]]:

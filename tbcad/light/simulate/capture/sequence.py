@@ -23,7 +23,7 @@ from tbcad.core.optics.camera import Camera
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.files import create_rays, filtered_chunk
 from tbcad.light.simulate.capture.light_field import CameraFrame, LightField
-from tbcad.light.simulate.capture.photograph import row_bands, to_bytes
+from tbcad.light.simulate.capture.photograph import to_bytes
 from tbcad.light.simulate.parallel import chunks, in_threads
 from tbcad.light.simulate.scene.ray_casting import Scene, both_sides, built_in_shade, colours_along
 from tbcad.light.simulate.scene.rays import meets_sphere
@@ -80,16 +80,11 @@ def create_sequence(
 
 def kept_pixels(frame: CameraFrame, radius: float) -> Ints:
     """Numbers (r,) of the pixels whose rays meet the capture sphere, ascending."""
-
-    def band(rows: range) -> Ints:
-        part = frame.read(slice(rows.start, rows.stop))
-        origin, direction = (
-            part[name].reshape(-1, 3).astype(np.float64) for name in ("origin", "direction")
-        )
-        meets = meets_sphere(origin, direction, radius) & (part["mirror"].ravel() > 0)
-        return np.flatnonzero(meets) + rows.start * frame.camera.width_px
-
-    return np.concatenate(in_threads(band, row_bands(frame.camera.height_px)))
+    planes = frame.read(slice(None))
+    origin, direction = (
+        planes[name].reshape(-1, 3).astype(np.float64) for name in ("origin", "direction")
+    )
+    return np.flatnonzero(meets_sphere(origin, direction, radius) & (planes["mirror"].ravel() > 0))
 
 
 def sequence_frame(source: LightField, folder: Path, number: int) -> LightField:

@@ -248,6 +248,9 @@ def prototype_run(
     window = reflector.mirrors.apex
     if not plan.moved:
         window = rotated(plan.apex[ball], plan.frame[0], plan.angle[stop]) * flip
+    # The direction to one apex becomes that to the other, and the plane of incidence of the light
+    # from the origin stays one (tbcad.core.optics.windows).
+    before, after = _sight(window, reflector.camera.pinhole), _sight(apex, camera.pinhole)
     return PrototypeRun(
         reflector=reflector,
         camera=camera,
@@ -255,7 +258,7 @@ def prototype_run(
         stop=stop,
         ball=ball,
         ball_surfaces=Surfaces(apex, normal, 1 / radius),
-        window_rotation=_window_rotations(window, reflector.camera.pinhole, apex, camera.pinhole),
+        window_rotation=np.swapaxes(before, 1, 2) @ after,
         parted=plan.parted,
     )
 
@@ -285,18 +288,6 @@ def ball_reflector(run: PrototypeRun) -> SubstitutedReflector:
     """
     shell, balls = run.reflector, run.ball_surfaces
     return SubstitutedReflector(shell.camera_id, shell.camera, unit(balls.apex), shell.cells, balls)
-
-
-def _window_rotations(
-    window: Floats, window_pinhole: Floats, apex: Floats, pinhole: Floats
-) -> Floats:
-    """Rotation of each window along with its ball, (m, 3, 3), of apices (m, 3) and pinholes (3,).
-
-    The direction to one apex becomes that to the other, and the plane of incidence of the light
-    from the origin stays one (tbcad.core.optics.windows).
-    """
-    before, after = _sight(window, window_pinhole), _sight(apex, pinhole)
-    return np.asarray(np.swapaxes(before, 1, 2) @ after)
 
 
 def _sight(apex: Floats, pinhole: Floats) -> Floats:

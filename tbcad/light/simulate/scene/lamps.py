@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tbcad.core.geometry.vectors import dot, norm
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.records.prototype import NAME, Prototype
-from tbcad.types import Floats
+from tbcad.types import Bools, Floats
 
 # Rays toward a lamp begin so far above the facet that they do not meet it again by rounding, mm.
 ABOVE_FACET_MM = 1e-3
@@ -62,13 +63,13 @@ def lit_cosine(embree: Any, spots: Spots, direction: Floats) -> Floats:
     cosine = dot(direction, spots.normal)
     faces = np.flatnonzero((cosine > 0) & (dot(direction, spots.facet_normal) > 0))
     start = spots.place[faces] + ABOVE_FACET_MM * spots.facet_normal[faces]
-    lit = faces[_free(embree, start, direction[faces])]
+    lit = faces[free_rays(embree, start, direction[faces])]
     result = np.zeros(len(cosine))
     result[lit] = cosine[lit]
     return result
 
 
-def _free(embree: Any, start: Floats, direction: Floats) -> Any:
+def free_rays(embree: Any, start: NDArray[np.floating], direction: NDArray[np.floating]) -> Bools:
     """Which rays (k, 3) meet nothing; lamps are beyond the whole object."""
     if len(start) == 0:
         return np.zeros(0, dtype=bool)

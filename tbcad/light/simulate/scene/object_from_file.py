@@ -59,27 +59,16 @@ class ObjectOptions:
     unit: Unit | None = None  # of the file; None: as the file or its format says, else mm
 
 
-def load_or_built_in(
-    path: str | PathLike[str] | None,
-    capture_mm: float,
-    options: ObjectOptions | None = None,
-    told: Progress | None = None,
-) -> SceneObject:
-    """The object of a file, as `load_object` reads it, or without one the built-in one."""
-    if path is None:
-        return built_in_object(capture_mm)
-    return load_object(Path(path), capture_mm, options, told)
-
-
 def load_object(
-    path: Path,
+    file: str | PathLike[str] | None,
     capture_mm: float,
     options: ObjectOptions | None = None,
     told: Progress | None = None,
 ) -> SceneObject:
     """Read a triangle mesh: PLY, STL, OBJ, OFF, GLB, glTF or 3MF, its textures in the same folder.
 
-    `told` is called with a line that says which unit, axis and colours were taken.
+    Without a file it is the built-in object. `told` is called with a line that says which unit,
+    axis and colours were taken.
 
     Raises:
         InputError: it cannot be read, is empty, has no facets or is too large; it names the size.
@@ -88,7 +77,9 @@ def load_object(
         PlausibilityWarning: it is so small that its unit is likely to be another one, or it names
             what was not found or is left out.
     """
-    asked = options or ObjectOptions()
+    if file is None:
+        return built_in_object(capture_mm)
+    path, asked = Path(file), options or ObjectOptions()
     with np.errstate(all="ignore"):  # what is not finite is refused, in words
         found = read_object_file(path)
         unit, up = asked.unit or found.unit or "mm", asked.up or found.up or "z"

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.core.geometry.vectors import dot, facet_vectors, unit
+from tbcad.core.optics.reflection import reflect
 from tbcad.light.simulate.parallel import over_chunks
 from tbcad.light.simulate.scene.lamps import PointLights, Spots, lamp_light
 from tbcad.light.simulate.scene.object import SceneObject, pattern
@@ -155,19 +156,11 @@ def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
     depth[hits.rows] = hits.depth
     colour[hits.rows] = 255 * (hits.albedo(scene.subject) * _light(scene, hits))
     if scene.gloss and scene.lamps is None:
-        glint = scene.gloss * _highlights(scene.subject, hits, direction[hits.rows])
+        # Source: B. T. Phong, Communications of the ACM 18(6), 1975.
+        mirrored = reflect(hits.direction, hits.normals(scene.subject))
+        glint = scene.gloss * (np.maximum(mirrored @ LAMPS.T, 0) ** GLOSS_EXPONENT @ LAMP_LIGHT)
         colour[hits.rows] = np.minimum(colour[hits.rows] + 255 * glint[:, None], 255)
     return RayHits(colour, depth)
-
-
-def _highlights(subject: SceneObject, hits: SurfaceHits, direction: Floats) -> Floats:
-    """Light of both lamps (k,) that the surface throws back along unit directions (k, 3).
-
-    Source: B. T. Phong, Communications of the ACM 18(6), 1975.
-    """
-    normal = hits.normals(subject)
-    mirrored = direction - 2 * dot(direction, normal)[:, None] * normal
-    return np.asarray(np.maximum(mirrored @ LAMPS.T, 0) ** GLOSS_EXPONENT @ LAMP_LIGHT)
 
 
 def _light(scene: Scene, hits: SurfaceHits) -> Floats:

@@ -268,13 +268,12 @@ def camera_around_object(
     distance: float,
     capture_mm: float,
     size: tuple[int, int] = (640, 480),
-    hfov: float | None = None,
 ) -> Camera:
     """A pinhole camera that looks at the origin, z up.
 
-    Azimuth about z from x, elevation above z = 0 and angle of view across the columns in radians;
-    without `hfov` the capture sphere fills the shorter side but for a small margin. `size`: columns
-    and rows. InputError for a viewpoint below the hemisphere of virtual cameras, or in the object.
+    Azimuth about z from x, and elevation above z = 0, in radians; the capture sphere fills the
+    shorter side but for a small margin. `size`: columns and rows. InputError for a viewpoint below
+    the hemisphere of virtual cameras, or in the object.
     """
     if not 0 <= elevation <= np.pi / 2:
         raise InputError(
@@ -291,9 +290,8 @@ def camera_around_object(
     horizontal = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     forward = -np.cos(elevation) * horizontal - np.sin(elevation) * np.array([0.0, 0.0, 1.0])
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-    if hfov is None:
-        tangent = np.tan(np.arcsin(capture_mm / 2 / distance))
-        hfov = float(2 * np.arctan(FRAME_MARGIN * tangent * size[0] / min(size)))
+    tangent = np.tan(np.arcsin(capture_mm / 2 / distance))
+    hfov = float(2 * np.arctan(FRAME_MARGIN * tangent * size[0] / min(size)))
     return Camera(-distance * forward, forward, right, *size, hfov)
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tbcad.cad.formats.checked_files import REBUILD
@@ -147,11 +146,8 @@ def facet_owners(bare: Surfaces, corners: Floats) -> Ints:
         i = np.repeat(likely[unassigned, None], 3, axis=1)
         on = np.abs(bare.value(i, corners[unassigned])).max(axis=1) < ON_MIRROR_MM
         owner[unassigned[on]] = likely[unassigned[on]]
-    owner[~_along(bare, corners, owner)] = -1
-    return owner
-
-
-def _along(bare: Surfaces, corners: Floats, owner: Ints) -> NDArray[np.bool_]:
-    """Which facets (f, 3, 3) lie along their mirror: a wall's corners may all be on its rim."""
+    # A wall's corners may all be on the rim of a mirror, along which it does not lie.
     area, normal = facet_vectors(corners), bare.gradient(owner, corners.mean(axis=1))
-    return np.asarray(np.abs(dot(area, normal)) > MIN_FACET_COSINE * norm(area) * norm(normal))
+    along = np.abs(dot(area, normal)) > MIN_FACET_COSINE * norm(area) * norm(normal)
+    owner[~along] = -1
+    return owner

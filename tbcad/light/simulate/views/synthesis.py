@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.common.compiled import compiled
-from tbcad.common.figure_files import png_bytes
+from tbcad.common.figure_files import image_bytes
 from tbcad.core.optics.camera import Camera
 from tbcad.light.simulate.scene.rays import meets_sphere
 from tbcad.light.simulate.views.blend import blend_cameras
@@ -52,7 +52,7 @@ class SynthesisedView:
 
     def _repr_png_(self) -> bytes:
         """What notebooks show: the picture."""
-        return png_bytes(self.image)
+        return image_bytes(self.image)
 
 
 def synthesise(

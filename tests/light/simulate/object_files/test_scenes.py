@@ -17,7 +17,7 @@ from tbcad.cad.kernel.mesh import Mesh
 from tbcad.errors import InputError
 from tbcad.light.simulate.object_files.contents import ObjectFile
 from tbcad.light.simulate.object_files.gltf import read_gltf
-from tbcad.light.simulate.object_files.threemf import read_3mf
+from tbcad.light.simulate.object_files.read import read_3mf
 
 # sRGB's code of light 0.5 and 0.2, by the standard's table.
 HALF, FIFTH = 0.735357, 0.484529

@@ -72,12 +72,6 @@ def test_what_does_not_fit_names_the_size_and_can_be_fitted(
     assert fitted.points.mean(axis=0) == pytest.approx([0, 0, 0], abs=1e-3)
 
 
-def test_no_such_file(tmp_path: Path) -> None:
-    for path in (tmp_path / "absent.ply", tmp_path):
-        with pytest.raises(InputError, match="no such file; give a triangle mesh"):
-            load_object(path, CAPTURE_MM)
-
-
 def test_built_in_object_is_a_closed_body_of_many_colours() -> None:
     subject = built_in_object(CAPTURE_MM)
     mesh = trimesh.Trimesh(subject.points, subject.faces, process=False)

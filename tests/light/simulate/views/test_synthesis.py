@@ -11,7 +11,6 @@ from PIL import Image
 import tbcad
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import Camera
-from tbcad.errors import InputError
 from tbcad.light.depth.depth_map import depth_views
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import to_bytes
@@ -143,26 +142,6 @@ def test_the_papers_69_pinholes() -> None:
     assert len(places) == 69
     assert np.linalg.norm(places, axis=1).max() == pytest.approx(1)
     assert {tuple(place) for place in -places} == {tuple(place) for place in places}
-
-
-@pytest.mark.parametrize(
-    ("elevation", "distance", "wrong"),
-    [(-1, 640, "--elevation"), (91, 640, "--elevation"), (float("nan"), 640, "--elevation"),
-     (10, 29, "--distance"), (10, float("inf"), "--distance"), (10, float("nan"), "--distance")],
-)  # fmt: skip
-def test_viewpoints_refused(elevation: float, distance: float, wrong: str) -> None:
-    with pytest.raises(InputError, match=wrong):
-        view_from(0, elevation, distance)
-
-
-@pytest.mark.parametrize(
-    ("aperture", "plane", "wrong"),
-    [(0, 0, "--aperture"), (float("inf"), 0, "--aperture"), (300, 100, "--focus"),
-     (300, float("nan"), "--focus")],
-)  # fmt: skip
-def test_lenses_refused(aperture: float, plane: float, wrong: str) -> None:
-    with pytest.raises(InputError, match=wrong):
-        ThinLens(aperture, plane).check(view_from(0, 0), 60.0)
 
 
 def test_the_capture_sphere_fills_a_view() -> None:
