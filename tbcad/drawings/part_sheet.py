@@ -263,7 +263,6 @@ def _overall(frame: _Frame, found: Sequence[RoundFace]) -> Iterator[Entity]:
 
 
 def _rows(paper: Point) -> int:
-    """Rows that a column has room for."""
     _, low, _, high = drawing_room(paper)
     return int((high - low - BESIDE_MM) / TABLE_ROW_MM)
 

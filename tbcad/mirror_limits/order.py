@@ -277,7 +277,6 @@ def _notes(chain: Chain) -> dict[str, str]:
 def _record(
     export: ExportedDesign, found: Sensitivities, limits: MirrorLimits, chain: Chain
 ) -> dict[str, Any]:
-    """The record of an order."""
     each = {"smallest": limits.each.min(axis=0), "median": np.median(limits.each, axis=0)}
     process, numbers = chain.process, sampled(export.reflectors[0].mirrors.apex, limits)
     ids = [mirror_ids(one.camera_id, len(one)) for one in export.reflectors]

@@ -308,7 +308,6 @@ def wiring_step(machine: AssembledMachine) -> Words:
 
 
 def _line(machine: AssembledMachine, row: WiringRow) -> str:
-    """A line of wiring.csv in words."""
     line, part = f"Line {row.line}, {row.signal.replace('_', ' ')}:", machine.ref(row.part)
     if row.signal in OWN_WIRES:
         rated = f", {row.current_ma:.0f} mA RMS" if row.current_ma else ""

@@ -212,7 +212,6 @@ class BallChoices:
 
     @cached_property
     def _catalogue(self) -> Catalogue:
-        """Balls that can be bought."""
         limits = self.spec.prototype
         return load_catalogue(limits.catalogues).available(limits.grade, limits.largest_ball_mm)
 

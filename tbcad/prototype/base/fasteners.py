@@ -160,7 +160,6 @@ def _drive_screws(places: _Places, drive: Drive, parts: Parts) -> Iterator[Faste
 
 
 def _joint(places: _Places, joint: Joint, parts: Parts) -> Iterator[Fastener]:
-    """Dowels, screws and inserts of a joint."""
     spec, normal = places.base.spec, joint.plane.normal
     hardware = joint_hardware(spec)
     dowel, screw = parts[hardware.dowel], parts[hardware.screw]

@@ -160,7 +160,6 @@ def _data(
     manifest: Manifest,
     capture: Path | None,
 ) -> dict[str, Any]:
-    """What the scripts read."""
     arrays = PackedArrays()
     table = bodies.packed_mirrors(folder, verdict, arrays)
     facets = bodies.coarse_facets(export)

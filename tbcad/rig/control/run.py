@@ -231,7 +231,6 @@ class Session:
                 self._one(shots.frame, name, note)
 
     def _one(self, frame: Frame, phase: str, note: Progress) -> None:
-        """One photograph, or why there is none."""
         name = exposure_name(frame, phase)
         check = partial(check_like_record, self._writer.record, phase)
         try:
