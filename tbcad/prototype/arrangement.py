@@ -304,12 +304,12 @@ def _clearances(site: Site, frame: FrameLayout) -> tuple[dict[str, float], dict[
         if distance < clearance:
             raise SpecError(
                 f"{name.replace('_', ' ')}: {distance:.1f} mm from the {obstacle}, less than "
-                f"prototype.frame.clearance_mm {clearance:g}: make {_remedy(name)}"
+                f"prototype.frame.clearance_mm {clearance:g}: make {_more_room(name)}"
             )
     return light, swept
 
 
-def _remedy(name: str) -> str:
+def _more_room(name: str) -> str:
     """What to change so that a body has more clearance."""
     remedies = (one for part in PARTS for one in part.remedies.items())
     return next((text for pattern, text in remedies if fnmatchcase(name, pattern)), REMEDY)

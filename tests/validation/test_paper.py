@@ -148,13 +148,6 @@ def test_pixels_fall_with_elevation(angles: Study) -> None:
     assert (np.diff(bands.numbers("mean_to_camera_mm")) > 0).all()
 
 
-def test_radius_follows_the_polar_angle(angles: Study) -> None:
-    """Section 5.1; strong: a coefficient beyond 0.95, against below 0.1 with the azimuth."""
-    for row in angles.tables[2].where(of="log radius").records():
-        strong = row["with"] == "polar angle"
-        assert (abs(float(row["correlation"])) > 0.95) == strong  # type: ignore[arg-type]
-
-
 def test_mirrors_near_the_object_are_small(angles: Study) -> None:
     """Section 6, and that pixels are uneven: 31 times between the fewest and the most."""
     areas = angles.tables[2].where(of="area")
@@ -242,16 +235,6 @@ def test_traced_coverage_of_flat_mirrors_agrees_with_their_cones() -> None:
     cone = 2 * ELLIPSOID.camera_distance * np.sin(half.theta0)
     assert half.coverage[inner] == pytest.approx(cone[inner], rel=1e-6)
     assert half.coverage.min() == pytest.approx(21.2, rel=0.05)
-
-
-def test_radii_by_equation_2() -> None:
-    """8.00 ... 65.4 mm, strongly tied to the polar angle of 45 ... 135 degrees."""
-    half = mirror_array("radius_rule=paper")
-    radius = half.mirrors.radius
-    assert radius.min() == pytest.approx(8.00, abs=0.005)
-    assert radius.max() == pytest.approx(65.4, abs=0.06)
-    assert np.degrees([half.polar.min(), half.polar.max()]) == pytest.approx([45, 135], abs=1)
-    assert np.corrcoef(half.polar, np.log(radius))[0, 1] < -0.9
 
 
 def test_equation_2_falls_short() -> None:
