@@ -231,7 +231,6 @@ def _capture_length(
 
 
 def _values(layout: Layout, words: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
-    """Symbols, what they are, and their values."""
     optics, k = layout.optics, layout.named
     radii = [row.radius_mm for row in layout.rows if row.radius_mm]
     x, y, z = optics.camera_mm

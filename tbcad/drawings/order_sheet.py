@@ -178,7 +178,6 @@ def _wrapped(told: Sequence[tuple[str, str]], characters: int) -> list[tuple[str
 
 
 def _title_block(record: dict[str, Any], spec: Spec) -> TitleBlock:
-    """What the title block says."""
     named = [step["material"]["value"] for step in record["chain"]["steps"] if "material" in step]
     return TitleBlock(
         title=f"Order: shells by {record['chain']['name']}",

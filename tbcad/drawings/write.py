@@ -109,7 +109,7 @@ def draw(export: DrawnExport, place: Path, name: str) -> list[WrittenSheet]:
     InputError: a file that is drawn is missing or not as it was written.
     """
     from tbcad.drawings.assembly_sheet import draw_assembly
-    from tbcad.drawings.printed_parts import draw_part
+    from tbcad.drawings.part_sheet import draw_part
     from tbcad.drawings.shell_sheet import draw_shell
 
     if name in export.parts:

@@ -6,7 +6,8 @@ of preference, in which balls, seats, base, stage and frame have room.
 
 from collections import Counter
 from collections.abc import Generator, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -33,13 +34,13 @@ from tbcad.prototype.drive.balance import (
 from tbcad.prototype.drive.drive import Drive, base_torques, choose_drive, load_drives
 from tbcad.prototype.electronics import led_circuit
 from tbcad.prototype.fasteners import Fastener, numbered
-from tbcad.prototype.frame.layout import frame_layout
 from tbcad.prototype.frame.stock import Stock
-from tbcad.prototype.keepout import KeepOut, keep_out_volume
+from tbcad.prototype.keepout import KeepOut, keep_out_volume, min_distance
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout, shroud_layout
 from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.purchased.parts import Parts, load_parts
+from tbcad.prototype.registry import FRAME, PARTS
 from tbcad.prototype.stage.layout import StageLayout, stage_fasteners, stage_layout
 
 if TYPE_CHECKING:
@@ -268,6 +269,47 @@ def _remedy(design: MirrorDesign, tried: list[int]) -> str:
 
 
 def _open_keys(spec: Spec) -> dict[str, object]:
-    """Values of the keys that may be open."""
     base = spec.prototype.base
     return {"k": spec.prototype.k} | {f"base.{key}": getattr(base, key) for key in OPEN_BASE_KEYS}
+
+
+MAY_BE_LIT = ("camera",)  # light goes into it
+REMEDY = "prototype.frame.uprights_mm or prototype.largest_ball_mm smaller"
+
+
+def frame_layout(site: Site) -> FrameLayout:
+    """The frame round a base and a stage; SpecError names what to change where it does not fit."""
+    frame = FrameLayout(())
+    for part in FRAME:
+        if mounted := part.layout(site, frame):
+            frame = FrameLayout((*frame.mounted, mounted))
+    light, swept = _clearances(site, frame)
+    return replace(frame, light=light, swept=swept)
+
+
+def _clearances(site: Site, frame: FrameLayout) -> tuple[dict[str, float], dict[str, float]]:
+    """Smallest distances of all static parts to light and to what the base sweeps."""
+    keep_out, clearance = site.keep_out, site.spec.prototype.frame.clearance_mm
+    bodies = (*frame.printed, *frame.purchased)
+    static = {body.name: body.added for body in bodies if not body.rotates}
+    light = {
+        name: min_distance(keep_out.to_light, bodies)
+        for name, bodies in static.items()
+        if name not in MAY_BE_LIT
+    }
+    swept = {name: min_distance(keep_out.to_swept, bodies) for name, bodies in static.items()}
+    obstacles = ("light of the balls", "balls and base as they swing")
+    for obstacle, distances in zip(obstacles, (light, swept), strict=True):
+        name, distance = min(distances.items(), key=lambda item: item[1])
+        if distance < clearance:
+            raise SpecError(
+                f"{name.replace('_', ' ')}: {distance:.1f} mm from the {obstacle}, less than "
+                f"prototype.frame.clearance_mm {clearance:g}: make {_more_room(name)}"
+            )
+    return light, swept
+
+
+def _more_room(name: str) -> str:
+    """What to change so that a body has more clearance."""
+    remedies = (one for part in PARTS for one in part.remedies.items())
+    return next((text for pattern, text in remedies if fnmatchcase(name, pattern)), REMEDY)

@@ -19,7 +19,13 @@ from tbcad.cad.formats.checked_files import Row
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import MotionSpec, PrototypeSpec, StageSpec
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import (
+    AssembledMachine,
+    Words,
+    planned,
+    told_words,
+    when,
+)
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.part import FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
@@ -290,39 +296,18 @@ def _wire(section: StageSpec, stage: StageLayout, current_ma: float, parts: Part
 @planned("Wiring", loose=("electronics", "wires", "connectors", "resistors"))
 def wiring_step(machine: AssembledMachine) -> Words:
     """Lines of the controller, one each; without lamps, where light comes from instead."""
-    does = [
-        "Controller, supply, relay and switch modules stand outside the shroud. Supply off.",
-        "Plus of the supply goes to each lamp, and through its resistor to each LED's anode (odd "
-        "pin). Their other ends (an LED's cathode: even pin) go to the drain of a switch module, "
-        "whose input is the controller's output.",
-        *(_line(machine, row) for row in machine.wiring),
-        when(
-            not machine.record.lamps,
-            "This design has no place for lamps of its own, and none are in the list: buy two "
-            "small ones alike, for 24 V and 2 W each, and connect both to line 1. Fasten them "
-            "lower than the object and in the middle of the machine, one toward the camera and one "
-            "toward the uprights, as far from the object, out of the camera's picture of balls and "
-            "out of the base's way (turn it by hand). They light it alike before and after its "
-            "half turn. Without them no photograph shows the object.",
-        ),
-        "Never plug or unplug the motor with the supply on: that destroys drivers, and the base "
-        "falls. Zero pin in before the supply is switched off. No wire goes to the base.",
-    ]
-    checks = [
-        "Before the supply is on: between its plus and minus, behind the fuse, are more than 100 "
-        "ohm, and a few ohm between the two wires of each of the motor's coils.",
-        "With the supply on, no part gets warm and no LED lights.",
-        *(
-            f"{row.on} switches {row.signal.replace('_', ' ')} on, {row.off} off."
-            for row in machine.wiring
-            if row.on
-        ),
-    ]
-    return does, checks, ["Solder or crimp all joints, and insulate each one."]
+    rows = machine.wiring
+    switched = [{"row": row, "name": row.signal.replace("_", " ")} for row in rows if row.on]
+    return told_words(
+        __name__,
+        "wiring",
+        lines=[{"line": _line(machine, row)} for row in rows],
+        no_lamps=not machine.record.lamps,
+        switched=switched,
+    )
 
 
 def _line(machine: AssembledMachine, row: WiringRow) -> str:
-    """A line of wiring.csv in words."""
     line, part = f"Line {row.line}, {row.signal.replace('_', ' ')}:", machine.ref(row.part)
     if row.signal in OWN_WIRES:
         rated = f", {row.current_ma:.0f} mA RMS" if row.current_ma else ""
@@ -340,21 +325,7 @@ def first_step(machine: AssembledMachine) -> Words:
     phases = machine.record.controller.phases
     low, high = machine.record.swing_deg
     names = ", ".join(one.name.replace("_", " ") for one in phases)
-    does = [
-        "Object on the disc, shroud closed. tbcad run drives machine and camera and keeps the "
-        "photographs; any G-code sender runs rotation_plan.nc with the camera on the relay.",
-        f"At each stop it takes {len(phases)} photographs: {names}.",
-        "When the program waits, turn the disc with the object by 180 degrees and let it go on.",
-    ]
-    checks = [
-        f"The base swings from {low:.0f} to {high:.0f} degrees and touches nothing. The first "
-        "time, keep a hand at Ctrl-C of tbcad run, or at the sender's feed hold (Klipper: pause), "
-        "which stop it with the motor on. The supply's switch, an emergency stop in it, its plug "
-        "and its fuse let it fall.",
-        "The number of photographs is the same in both runs.",
-        "Afterwards the base is at zero and the zero pin in, before the supply is switched off.",
-    ]
-    return does, checks
+    return told_words(__name__, "first", count=len(phases), names=names, low=low, high=high)
 
 
 WIRING = Part((wiring_step,), wiring_layout)

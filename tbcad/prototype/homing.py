@@ -16,7 +16,13 @@ from tbcad.core.geometry.primitives import (
 )
 from tbcad.core.geometry.rotations import unit_circle
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import (
+    AssembledMachine,
+    Words,
+    planned,
+    told_words,
+    when,
+)
 from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, PIN_MM, PIN_OUT_MM, SCREW_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.balance import HomeAngles, home_angles
@@ -271,80 +277,34 @@ def _switch(base: BaseLayout, place: _SwitchPlace, parts: Parts) -> Component:
 def homing_step(machine: AssembledMachine) -> Words:
     """Switch, bracket and the zero pin."""
     home = machine.record.home
-    does = [
-        "Screw the switch on its bracket, the roller toward the axis. Screw the bracket on the "
-        "head's side.",
-        "Turn the base by hand until the marks of disc and head are in line, and push the zero pin "
-        f"{machine.ref(home.pin)} from behind through the head into the disc. That is base angle "
-        "zero.",
-        "Leave the zero pin in until the motor holds the base: without both, the base turns down "
-        "and its balls strike what stands below."
-        if machine.has("motor")
-        else "Pull the zero pin out again.",
-    ]
-    checks = [
-        f"The zero pin of {PIN_MM:g} mm goes through head and disc without force.",
-        "Turned by hand against the arrow, the base clicks the switch at about "
-        f"{abs(home.switch_deg):.0f} degrees from zero.",
-    ]
-    return does, checks
+    return told_words(
+        __name__,
+        "homing",
+        pin=machine.ref(home.pin),
+        motor=machine.has("motor"),
+        no_motor=not machine.has("motor"),
+        pin_mm=PIN_MM,
+        switch_deg=abs(home.switch_deg),
+    )
 
 
 @planned("Angle zero")
 def zero_step(machine: AssembledMachine) -> Words:
     """Settings, homing and the trim."""
-    drive, home, off = machine.record.drive, machine.record.home, machine.record.power_off
-    current = drive.hold_current_a
     homes = machine.record.controller.firmware == "grblhal"
     rated = next((row.current_ma for row in machine.wiring if row.signal == "motor"), None)
-    of_motor = f", {rated / MA_PER_A:.1f} A," if rated else ""
-    does = [
-        when(
-            current,
-            f"Set the driver to the motor's rated current{of_motor} while it turns, and "
-            f"{current:.2f} A (root mean square) at rest (IRUN and IHOLD of Trinamic drivers).",
-        ),
-        "Send grbl_settings.txt line by line from a G-code sender. With Klipper include "
-        "klipper.cfg instead, fill in the board's pins, and print rotation_plan_klipper.gcode.",
-        when(
-            homes,
-            "grblHAL starts in alarm when its inputs for reset, emergency stop and door are empty: "
-            "send $14=73 then, which inverts them.",
-        ),
-        f"{when(homes, 'Unlock the controller by $X. ')}Jog by 0.1 degrees, so that the motor "
-        "holds the base (if not, change $4), and pull the zero pin out. Jog a little in the "
-        "positive direction. If the base turns against the disc's arrow, set $3 as the file's "
-        "comment says.",
-        "Home ($H), send the program's line G92, and jog until the zero pin goes in. The angle "
-        "that the controller shows, with a changed sign, is prototype.motion.home_trim_deg: build "
-        "again with it."
-        if homes
-        else "Jog until the zero pin goes in, and switch the controller on there: that is its "
-        "zero.",
-        "Pull the zero pin out, and keep the motor powered. Before the supply is switched off or "
-        "unplugged, its fuse taken out, or the controller reset or restarted, send the base to "
-        "zero and put the pin in.",
-        when(
-            off.fall_energy_j,
-            "Nothing but the motor's current holds the base while the pin is out. If the supply "
-            "fails, the base falls and strikes the end of its travel with up to "
-            f"{off.fall_energy_j:.1f} J at {off.fall_speed_deg_s:.0f} degrees a second: keep hands "
-            "out of its way, and use an uninterruptible supply for controller and motor. The pin "
-            f"bears {off.pin_force_n:.0f} N of gravity at most, {off.pin_pressure_mpa:.1f} MPa in "
-            f"its printed hole ({off.pin_pressure_limit_mpa:.0f} are allowed).",
-        ),
-    ]
-    checks = [
-        when(
-            homes,
-            "Before $H: the controller's report (send ?) has Pn with the axis's letter while the "
-            "switch is pressed by hand, and only then.",
-        ),
-        when(homes, f"Homed, the base stops at {home.homed_deg:.1f} degrees, again and again."),
-        f"Sent to zero, the zero pin goes in: the error is at most {home.zero_error_deg:.1f} "
-        "degrees.",
-    ]
-    return does, checks
+    return told_words(
+        __name__,
+        "zero",
+        current=machine.record.drive.hold_current_a,
+        of_motor=f", {rated / MA_PER_A:.1f} A," if rated else "",
+        homes=homes,
+        by_hand=not homes,
+        unlock=when(homes, "Unlock the controller by $X. "),
+        falls=machine.record.power_off.fall_energy_j,
+        off=machine.record.power_off,
+        home=machine.record.home,
+    )
 
 
 HOMING = Part((homing_step,), homing_layout)

@@ -15,7 +15,12 @@ from tbcad.common.schedule import Submit
 from tbcad.core.geometry.primitives import Component
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.arrangement import PrototypeModel, balance_and_drive, shroud_round
+from tbcad.prototype.arrangement import (
+    PrototypeModel,
+    balance_and_drive,
+    frame_layout,
+    shroud_round,
+)
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.coupon import coupon_plates
 from tbcad.prototype.base.coupon_seats import expected_downs, worst_pose
@@ -24,7 +29,6 @@ from tbcad.prototype.base.seat_solids import cap_parts
 from tbcad.prototype.base.solid import carrier_parts
 from tbcad.prototype.drive.balance import PointMasses
 from tbcad.prototype.electronics import Wiring
-from tbcad.prototype.frame.layout import frame_layout
 from tbcad.prototype.homing import HomingLayout
 from tbcad.prototype.printed import PlacedSolid, PrintedPart, Role, placed_component
 from tbcad.types import Progress

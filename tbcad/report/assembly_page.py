@@ -100,7 +100,6 @@ def _list(texts: Iterable[str], kind: str = "ul", attribute: str = "") -> str:
 
 
 def _drawn(folder: Path) -> dict[str, bytes]:
-    """Pictures by keys of steps."""
     check_drawn_files(folder)
     with tempfile.TemporaryDirectory(prefix="tbcad-assembly-") as place:
         draw_apart(MODULE, str(folder), place)

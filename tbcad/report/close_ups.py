@@ -202,7 +202,6 @@ def _draw_outline(axes: "Axes", points: Floats, low: float) -> None:
 
 
 def _draw_inset(axes: "Axes", section: EdgeSection) -> None:
-    """One edge in its own scale."""
     x, y = section.edges[1].bottom
     inset = axes.inset_axes((0.3, 0.66, 0.4, 0.32))
     _draw_outline(inset, section.points, y - 2)

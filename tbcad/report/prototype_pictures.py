@@ -119,7 +119,6 @@ def surface(vertices: Floats, triangles: Ints) -> pyvista.PolyData:
 
 
 def _add(plotter: pyvista.Plotter, bodies: Iterable[Body]) -> None:
-    """Draw bodies on white."""
     plotter.set_background("white")
     for body in bodies:
         plotter.add_mesh(

@@ -111,7 +111,6 @@ def _range(values: Floats) -> DepthRange:
 
 
 def _ranges(by_rule: dict[str, VirtualImages]) -> dict[str, DepthRange]:
-    """Ranges of depth that are to be sharp, by name."""
     return {
         **{f"{rule} radii, along the axis": _range(one.depth) for rule, one in by_rule.items()},
         **{f"{rule} radii, distances": _range(one.distance) for rule, one in by_rule.items()},

@@ -1,11 +1,14 @@
 """Virtual cameras against pixels: how many there are of each, and where they balance (Fig. 5b)."""
 
 from dataclasses import asdict, dataclass
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
 from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
+from tbcad.common.schedule import run_units
+from tbcad.core.geometry.conics import Ellipsoid
+from tbcad.core.mirrors.array import numbered_directions
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.photograph import (
@@ -14,12 +17,12 @@ from tbcad.light.simulate.capture.photograph import (
     count_pixels,
     virtual_cameras,
 )
-from tbcad.studies.definitions import DISC, IN_FRAME, definitions
 from tbcad.studies.paper import (
     HEADINGS,
     NUMBER,
     RESOLUTION,
     TABLE_II,
+    BalancedSensor,
     balanced_sensors,
     for_each_n,
     megapixels,
@@ -34,8 +37,9 @@ COUNTED = (
     *("virtual_cameras", "seeing_px", "on_mirrors_px", "seeing_average_px"),
     *("on_mirrors_average_px", "frame_filled", "rays_traced"),
 )
-# Definitions that agree with Table II, and with which of its columns.
-AGREEING = ((IN_FRAME, RESOLUTION), (f"{DISC}, camera", NUMBER))
+# From the vertical toward the object: the counts of apices in the frame of a camera that is turned
+# so come nearest to the second column of Table II. The paper does not state where its cameras look.
+PITCH_DEG = 17.86
 KINDS = {"seeing": "seeing_average_px", "on mirrors": "on_mirrors_average_px"}
 
 
@@ -104,8 +108,7 @@ def resolution(
 ) -> Study:
     """The study: counts for every n and sensor, and the n that balances them.
 
-    The table of definitions has the n of Table II. A Dask scheduler is given by its address; None:
-    this machine's cores.
+    A Dask scheduler is given by its address; None: this machine's cores.
     """
     spec = with_lens_of_table_i(spec)
     by_n = for_each_n(partial(_counts, spec, sensors), ns, progress, scheduler)
@@ -114,15 +117,13 @@ def resolution(
     )
     balances = [_balance(counts, s, r, kind) for s in sensors for r in ratios for kind in KINDS]
     balanced = Table.of_records("resolution-balance", balances, notes("resolution-balance"))
-    progress("definitions")
-    rows = tuple(r for r in balanced_sensors() if Sensor(r.width_px, r.height_px) in sensors)
-    defined, fits = definitions(spec, rows, progress)
-    figures = _definition_figures(defined)
+    rows = [r for r in balanced_sensors() if Sensor(r.width_px, r.height_px) in sensors]
+    figures = _table_ii_figures(spec, rows, progress)
     name = "balanced n at {ratio}, {width_px}x{height_px}, {pixels_counted}"
     for row in balances:
         figures.append(Figure(name.format(**row), "", row["balanced_n"], row["paper_n"], TABLE_II))
     panels = (_count_panel(counts, sensors), _balance_panel(balanced, ratios))
-    return Study("resolution", tuple(figures), (counts, balanced, defined, fits), panels)
+    return Study("resolution", tuple(figures), (counts, balanced), panels)
 
 
 def _counts(spec: Spec, sensors: tuple[Sensor, ...], n: int) -> list[Record]:
@@ -162,16 +163,80 @@ def _balance(counts: Table, sensor: Sensor, ratio: Ratio, kind: str) -> Record:
     }
 
 
-def _definition_figures(defined: Table) -> list[Figure]:
-    """The definitions that agree with the columns of Table II, beside them."""
-    figures = []
-    for prefix, column in AGREEING:
-        paper, where = f"paper_{column}", f"{TABLE_II}, '{HEADINGS[column]}'"
-        for record in defined.records():
-            if str(record["definition"]).startswith(prefix):
-                name = "{width_px}x{height_px}, n = {n}: {definition}".format(**record)
-                figures.append(Figure(name, "", record["value"], record[paper], where))
-    return figures
+def _table_ii_figures(spec: Spec, rows: list[BalancedSensor], progress: Progress) -> list[Figure]:
+    """What both columns of Table II count, of which the second comes first: mirrors, and pixels.
+
+    The headings stand in the wrong order: only the second column grows with n as a number of
+    mirrors does.
+    """
+    pixels = run_units(
+        partial(disc_pixels, spec), rows, progress=lambda row: progress(f"Table II: n = {row.n}")
+    )
+    mirrors = [apices_in_frame(spec, row.n) for row in rows]
+    counted = (
+        ("mirrors of both arrays whose apex is in the frame", mirrors, RESOLUTION),
+        ("disc pixels / mirrors", pixels, NUMBER),
+    )
+    return [
+        Figure(
+            f"{row.width_px}x{row.height_px}, n = {row.n}: {name}, camera pitched by "
+            f"{PITCH_DEG:.1f} deg",
+            "",
+            value,
+            getattr(row, column),
+            f"{TABLE_II}, '{HEADINGS[column]}'",
+        )
+        for name, values, column in counted
+        for row, value in zip(rows, values, strict=True)
+        if value is not None
+    ]
+
+
+def disc_pixels(spec: Spec, row: BalancedSensor) -> float | None:
+    """Mean pixels of a mirror that see the sphere within the largest cone that fits in it.
+
+    With the paper's radii, n and sensor of a row, and pitched cameras; None: no such design.
+    """
+    spec = with_lens_of_table_i(spec)
+    attempt = try_design(spec, optics={"n": row.n}, mirrors={"radius_rule": "paper"})
+    if attempt.array is None:
+        return None
+    sensor, radius = Sensor(row.width_px, row.height_px), spec.optics.capture_diameter_mm / 2
+    axes = axes_at_pitch(PITCH_DEG)
+    return float(count_pixels(attempt.array, sensor, radius, axes=axes).disc.mean())
+
+
+def apices_in_frame(spec: Spec, n: int, pitch_deg: float = PITCH_DEG) -> int:
+    """Apices of both arrays in their cameras' frames; those on the seam count for both.
+
+    Rows of pixels lie along y.
+    """
+    camera = with_lens_of_table_i(spec).camera
+    half_width = np.tan(np.radians(camera.hfov_deg) / 2)
+    half_height = half_width * camera.height_px / camera.width_px
+    optics = spec.optics
+    ray = _rays_to_apices(n, optics.camera_mm, optics.semi_minor_mm, optics.stretch)
+    forward, right = axes_at_pitch(pitch_deg)
+    depth, along, across = np.stack([forward, right, np.cross(forward, right)]) @ ray.T
+    inside = (np.abs(along) <= half_width * depth) & (np.abs(across) <= half_height * depth)
+    return 2 * int(inside.sum())
+
+
+def axes_at_pitch(pitch_deg: float) -> tuple[Floats, Floats]:
+    """Forward and right of camera a turned from the vertical toward the object, (3,) each."""
+    pitch = np.radians(pitch_deg)
+    return np.array([-np.sin(pitch), 0.0, np.cos(pitch)]), np.array([0.0, 1.0, 0.0])
+
+
+@cache
+def _rays_to_apices(
+    n: int, pinhole: tuple[float, ...], semi_minor: float, stretch: tuple[float, float]
+) -> Floats:
+    """From camera a's pinhole to its mirrors' apices, mm, (m, 3)."""
+    ellipsoid = Ellipsoid(np.array(pinhole), semi_minor)
+    u = numbered_directions(n, stretch)[0]
+    half_a = (u[:, 0] >= 0) & (u[:, 2] >= 0)
+    return ellipsoid.apices(u[half_a]) - ellipsoid.pinhole
 
 
 def _count_panel(counts: Table, sensors: tuple[Sensor, ...]) -> PlotPanel:

@@ -99,7 +99,6 @@ class SeeingPixels:
     minimum: float
 
     def __str__(self) -> str:
-        """Both, as text."""
         return f"{self.median:.0f} (minimum {self.minimum:.0f})"
 
 

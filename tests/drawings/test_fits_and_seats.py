@@ -13,7 +13,7 @@ from tbcad.cad.kernel.features import RoundFace
 from tbcad.cad.kernel.solids import cut, cylinder, faces, one_solid, polygon, prism
 from tbcad.core.spec.load import load_spec
 from tbcad.drawings.export import DrawnExport
-from tbcad.drawings.printed_parts import draw_part
+from tbcad.drawings.part_sheet import draw_part
 from tbcad.drawings.tables import (
     DrawnHole,
     ListedSeat,

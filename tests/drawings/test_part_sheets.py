@@ -15,8 +15,7 @@ from tbcad.cad.formats.entities import Circle, Layer, Line
 from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.features import bounds, cylinders, plane_levels
 from tbcad.cad.kernel.solids import cut, cylinder, faces, moved, one_solid, polygon, prism
-from tbcad.drawings.part_sheet import part_sheets
-from tbcad.drawings.printed_parts import part_datum
+from tbcad.drawings.part_sheet import part_datum, part_sheets
 from tbcad.drawings.tables import numbered_holes
 from tests.sheet_texts import check_texts, covered, texts
 

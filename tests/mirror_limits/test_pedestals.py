@@ -19,8 +19,13 @@ from tbcad.cad.formats.step_tolerances import (
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.pedestals.cells import groove_walls
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
-from tbcad.mirror_limits.files import dowel_face, halves, tolerances
-from tbcad.mirror_limits.order import found_limits, minimum_at_limits
+from tbcad.mirror_limits.order import (
+    dowel_face,
+    found_limits,
+    halves,
+    minimum_at_limits,
+    tolerances,
+)
 from tbcad.mirror_limits.sensitivity import MirrorLimits, Sensitivities, sensitivities
 from tbcad.shell.files import wall_names
 from tests.exported_files import read_csv

@@ -12,6 +12,7 @@ from tbcad.errors import InputError
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.manifest import COSTLY, fingerprint, kind_of, write_manifest
 from tbcad.records.document import Kind
+from tests.output.test_folder import tree
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 ASKED = ("capture", "merged run", "calibration")
@@ -32,10 +33,6 @@ def fake(folder: Path, kind: Kind) -> Path:
     if kind != "run":
         write_manifest(folder, kind)
     return folder
-
-
-def tree(folder: Path) -> dict[str, bytes]:
-    return {str(path): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.mark.parametrize("present", KINDS)

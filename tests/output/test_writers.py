@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from tbcad.errors import InputError
-from tbcad.output import writers
-from tbcad.output.folder import check_replaceable, replacing
+from tbcad.output import folder as folders
+from tbcad.output.folder import check_replaceable, new_folder, replacing
 
 ROOT = Path(__file__).parents[2]
 OLD = 1_600_000_000
@@ -19,7 +19,7 @@ OLD = 1_600_000_000
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Of another target than the one that is written."""
-    return writers.new_folder(tmp_path / "captures" / "knot")
+    return new_folder(tmp_path / "captures" / "knot")
 
 
 def left(folder: Path, host: str = "") -> Path:
@@ -63,7 +63,7 @@ def test_whose_locks_cannot_be_seen_stay_while_they_change(
     tmp_path: Path, folder: Path, unseen: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if unseen == "no locks":
-        monkeypatch.setattr(writers, "fcntl", None)
+        monkeypatch.setattr(folders, "fcntl", None)
     far = left(folder, host="00000000" if unseen == "another host" else "")
     check_replaceable(tmp_path / "captures" / "bunny", "capture", False)
     assert far.exists()

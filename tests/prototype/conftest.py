@@ -5,10 +5,10 @@ import pytest
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.load import load_spec
 from tbcad.core.spec.prototype import PrototypeSpec
+from tbcad.prototype.arrangement import frame_layout
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.prototype.base.layout import BaseLayout, base_layout
 from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.frame.layout import frame_layout
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
 from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.purchased.parts import load_parts

@@ -118,7 +118,6 @@ def _style(entity: Dimension, space: "BaseLayout", height: float) -> str:
 
 
 def _digits(size: str) -> int:
-    """Digits after the point."""
     return len(size.partition(".")[2])
 
 

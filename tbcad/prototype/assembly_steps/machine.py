@@ -1,12 +1,15 @@
 """A prototype as its export describes it: bodies, fasteners, list of parts; steps as planned."""
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from functools import cached_property
+from functools import cache, cached_property
+from importlib.resources import files
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
+from tbcad.common.told import told
 from tbcad.prototype.files.bom import PartsList, read_parts_list
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, load_parts
 from tbcad.records.prototype import NAME, FastenerRecord, Prototype
@@ -118,6 +121,27 @@ def planned(
 ) -> Callable[[Callable[[AssembledMachine], Words]], StepPlan]:
     """Plan a step whose words a function gives."""
     return lambda words: StepPlan(title, words, bodies, loose, near)
+
+
+def told_words(module: str, step: str, **values: object) -> Words:
+    """Words of a step from the TOML file beside a module, by its name, with values (`told`)."""
+    return tuple(
+        [text for _, text in told(lines, values)] for lines in _texts(module)[step].values()
+    )
+
+
+@cache
+def _texts(module: str) -> dict[str, dict[str, list[dict[str, Any]]]]:
+    """Lines of a module's steps by step, then does, checks and fits."""
+    package, _, name = module.rpartition(".")
+    table = tomllib.loads((files(package) / f"{name}.toml").read_text(encoding="utf-8"))
+    return {
+        step: {
+            kind: [{"text": one} if isinstance(one, str) else one for one in lines]
+            for kind, lines in kinds.items()
+        }
+        for step, kinds in table.items()
+    }
 
 
 def when(condition: object, text: str) -> str:

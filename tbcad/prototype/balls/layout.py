@@ -14,13 +14,15 @@ from tbcad.core.optics.ball_light import ball_poses, pixel_counts, used_outlines
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.prototype import MOST_BALLS
 from tbcad.prototype.balls.catalogue import Catalogue, Grade, load_catalogue, load_grades
-from tbcad.prototype.balls.clearance import (
+from tbcad.prototype.balls.placement import (
+    Placement,
+    PlacementProblem,
     allowed_azimuths,
     min_separations,
+    min_swing_placement,
     obstacles,
     seat_half_angles,
 )
-from tbcad.prototype.balls.placement import Placement, PlacementProblem, min_swing_placement
 from tbcad.prototype.balls.selection import (
     COVERAGE_ROUNDING_MM,
     BallCandidates,
@@ -212,7 +214,6 @@ class BallChoices:
 
     @cached_property
     def _catalogue(self) -> Catalogue:
-        """Balls that can be bought."""
         limits = self.spec.prototype
         return load_catalogue(limits.catalogues).available(limits.grade, limits.largest_ball_mm)
 

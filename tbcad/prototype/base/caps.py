@@ -18,7 +18,12 @@ from tbcad.cad.formats.entities import Arc, Entity, Layer, Line, Point, Polyline
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.reflection import roughness_nm, scattered_share
 from tbcad.core.spec.design import Spec
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import (
+    AssembledMachine,
+    Words,
+    planned,
+    told_words,
+)
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import magnet_part, seat_magnets
 from tbcad.prototype.base.holding import (
@@ -207,20 +212,13 @@ def _forces(base: BaseLayout, prototype: PrototypeLayout, k: int) -> tuple[float
 def caps_step(machine: AssembledMachine) -> Words:
     """Mirrors that are printed or turned."""
     caps = machine.record.caps
-    drawings = ", ".join(str(one.pdf) for one in caps)
-    does = [
-        "Print the caps front up in resin, or have them turned; polish and coat them as "
-        f"{drawings} ask{'s' if len(caps) == 1 else ''}.",
-        "Glue a magnet into each spigot, its north pole toward the front, so that the seat's "
-        "magnet attracts it.",
-        "Fit the spigot into the pocket of its seat.",
-    ]
-    checks = [
-        f"Cap {one.ball}: the spigot of {one.spigot_mm:.1f} mm slides into seat {one.ball} and "
-        f"tilts by at most {one.tilt_deg:.1f} degrees."
-        for one in caps
-    ]
-    return does, checks
+    return told_words(
+        __name__,
+        "caps",
+        drawings=", ".join(str(one.pdf) for one in caps),
+        ask="asks" if len(caps) == 1 else "ask",
+        caps=[{"cap": one} for one in caps],
+    )
 
 
 @planned("Balls into their seats", "ball_*", near=("carrier",))
@@ -229,27 +227,16 @@ def balls_step(machine: AssembledMachine) -> Words:
     held = [one for one in machine.record.holding.balls if one.ball in machine.sizes]
     magnets = [one for one in held if one.by == "magnet"]
     strongest = max(magnets, default=None, key=lambda one: one.force_available_n)
-    mass = machine.record.drive.mass_g / G_PER_KG
-    does = [
-        "Clean the balls with alcohol. Touch them only with gloves from now on.",
-        when(machine.record.caps, "Push the caps into their seats, too."),
-        "Put each into the seat with its number on the back, in any order. balls.csv lists the "
-        "balls by number."
-        if strongest
-        else "Put a small drop of glue into the well of each seat, none on the pads, and the ball "
-        "on it.",
-        f"The magnet of ball {strongest.ball} pulls with {strongest.force_available_n:.0f} N: let "
-        "the ball down by hand, and keep fingers off the edge of the cup."
-        if strongest
-        else "",
-    ]
     named = ((one.ball, machine.ref(f"ball {machine.sizes[one.ball]}")) for one in held)
-    checks = [
-        *(f"{name.capitalize()} in seat {number}." for number, name in named),
-        "Each touches its three pads and does not rock. It stays in its seat when the base is "
-        f"turned through its whole travel; the base weighs {mass:.1f} kg now.",
-    ]
-    return does, checks
+    return told_words(
+        __name__,
+        "balls",
+        caps=machine.record.caps,
+        strongest=strongest,
+        glue=strongest is None,
+        balls=[{"name": name.capitalize(), "number": number} for number, name in named],
+        kg=machine.record.drive.mass_g / G_PER_KG,
+    )
 
 
 def cap_sheet(design: str, base: BaseLayout, prototype: PrototypeLayout, one: CapRecord) -> Sheet:

@@ -102,7 +102,6 @@ def worst_pose(base: BaseLayout, split: BaseSplit, downs: Sequence[Floats]) -> S
 
 
 def _seats_of_pieces(base: BaseLayout, split: BaseSplit) -> list[list[int]]:
-    """Numbers of the seats in each piece."""
     seats = base.local_seats
     piece = [split.piece_of(end) for end in seats.at_depth(seats.back)]
     return [[k for k, at in enumerate(piece) if at == n] for n in range(len(split.pieces))]

@@ -6,7 +6,12 @@ import numpy as np
 
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import BaseSpec
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import (
+    AssembledMachine,
+    Words,
+    planned,
+    told_words,
+)
 from tbcad.prototype.base.hub import (
     BELOW_HEAD_MM,
     KEY_DEPTH_MM,
@@ -155,7 +160,6 @@ def _drive_screws(places: _Places, drive: Drive, parts: Parts) -> Iterator[Faste
 
 
 def _joint(places: _Places, joint: Joint, parts: Parts) -> Iterator[Fastener]:
-    """Dowels, screws and inserts of a joint."""
     spec, normal = places.base.spec, joint.plane.normal
     hardware = joint_hardware(spec)
     dowel, screw = parts[hardware.dowel], parts[hardware.screw]
@@ -188,21 +192,7 @@ def coupon_step(machine: AssembledMachine) -> Words:
     """The coupons, before the carrier is printed."""
     names = [machine.body_ref(body) for body in machine.bodies if body.startswith("coupon_")]
     black = sum(part.finish == MATT_BLACK for part in machine.record.parts)
-    does = [
-        f"Print {', '.join(names)} before the carrier: it has the seats of the largest, a middle "
-        "and the smallest ball, as designed and offset, in the pose of the carrier's worst seat. "
-        "Supports on the build plate only, as for the carrier.",
-        "Put the balls in. The seat fits in which the ball touches its three pads and nothing "
-        "else.",
-        "Set prototype.base.pad_offset_mm to the offset of that seat and build the design again. "
-        "Then print the carrier.",
-        when(
-            black,
-            "Print all parts as they lie in their files, with solid walls. All but coupon, gauge "
-            f"and caps ({black} parts) must be matt black: use black PETG, and paint what shines.",
-        ),
-    ]
-    return does, ["In the seat chosen, the ball does not rock when it is pushed at its edge."]
+    return told_words(__name__, "coupon", names=", ".join(names), black=black)
 
 
 @planned("The carrier", "carrier", "carrier_*", loose=("GLUE-EPOXY",))
@@ -211,39 +201,16 @@ def carrier_step(machine: AssembledMachine) -> Words:
     cut, shaft = machine.has("carrier_1"), machine.has("shaft")
     magnets = [one for one in machine.record.holding.balls if one.by == "magnet"]
     part = machine.listed(machine.bodies["shaft"]) if shaft else None
-    size = f" {part['diameter_mm']:g} H7" if part else ""
-    does = [
-        "Remove supports. Pads are the three small flats in each cup: clean them, but do not sand "
-        "them round.",
-        when(
-            shaft,
-            f"Ream the hub's bore with a hand reamer{size}, turned one way only: printed holes "
-            "come out 0.1 to 0.3 mm narrower than drawn.",
-        ),
-        f"Press the inserts into the holes of the {'hub and the joints' if cut else 'hub'}.",
-        when(
-            cut,
-            "Join the pieces in the order of the numbers at their joints: dowels first, then "
-            "screws, all of them loosely, then tight.",
-        ),
-        "Stack the magnets and mark the same pole of all with a pen. Glue one into each pocket, "
-        "below the pads, never above. The marked poles all face the same way: north toward the "
-        "ball."
-        if magnets
-        else "Balls are glued later: roughen the wells of the seats.",
-        "Let the glue harden for a day.",
-    ]
-    checks = [
-        when(shaft, "The shaft slides into the bore by hand."),
-        "A screw turns by hand into each insert, and stands square.",
-        *(f"Seat {one.ball}: {machine.ref(one.magnet or '')}." for one in magnets),
-        when(
-            magnets,
-            "No magnet stands above the pads: a straight edge across the pads does not touch it.",
-        ),
-        when(cut, "No joint opens when the carrier is held by its hub and shaken."),
-    ]
-    return does, checks
+    return told_words(
+        __name__,
+        "carrier",
+        shaft=shaft,
+        size=f" {part['diameter_mm']:g} H7" if part else "",
+        cut=cut,
+        inserted="hub and the joints" if cut else "hub",
+        magnets=[{"ball": one.ball, "magnet": machine.ref(one.magnet or "")} for one in magnets],
+        glue=not magnets,
+    )
 
 
 COUPON, CARRIER = Part((coupon_step,)), Part((carrier_step,))

@@ -123,7 +123,6 @@ def _piece(
 
 
 def _seats_in(base: BaseLayout, split: BaseSplit, n: int) -> Bools:
-    """Which seats are in a piece, (k,)."""
     seats = base.local_seats
     return np.array([split.piece_of(end) == n for end in seats.at_depth(seats.back)])
 

@@ -26,6 +26,7 @@ stepper.c of grblHAL core.
 import math
 import re
 from collections.abc import Iterable, Iterator
+from importlib.resources import files
 
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
@@ -55,9 +56,10 @@ PLAN, PROGRAM, CONFIG = "rotation_plan.nc", "rotation_plan_klipper.gcode", "klip
 STEPPER = "MANUAL_STEPPER STEPPER=base"
 SEARCH = 1.5  # travel of the search for the switch, over the travel, as GRBL has it
 MINUTE_S, MILLISECONDS = 60, 1000
-IDLE_S = 86_400  # of a day, after which Klipper tells that it is idle, and does no more
 MESSAGE = re.compile(r"M0 \(MSG, (.*?)[,.?]? [Tt]hen resume\)")
-PIN = "FILL_IN"  # what the user's board has
+# Not the stepper's enable_pin, which a shutdown takes back. The switch is normally closed to
+# ground: high when pressed. After a day Klipper tells that it is idle, and does no more.
+_TEMPLATE = files("tbcad.prototype") / "files" / "klipper.cfg"
 TRAVEL_STEP_DEG = 0.001  # that the travel is rounded up to
 Setting = tuple[int, float, str]
 
@@ -69,11 +71,11 @@ def controller_files(
     program, angles = gcode_program(layout, drive, motion, leds), home_angles(layout, motion)
     values = settings(drive, motion, angles)
     title = f"settings of {design} for {motion.controller}"
-    files: dict[str, Iterable[str]] = {PLAN: program, NAME: settings_lines(title, values)}
+    texts: dict[str, Iterable[str]] = {PLAN: program, NAME: settings_lines(title, values)}
     if motion.controller == "grblhal":
-        files[PROGRAM] = klipper_program(program, motion, angles)
-        files[CONFIG] = klipper_config(drive, motion, lights(leds, motion))
-    return {name: "\n".join(lines) + "\n" for name, lines in files.items()}
+        texts[PROGRAM] = klipper_program(program, motion, angles)
+        texts[CONFIG] = klipper_config(drive, motion, lights(leds, motion))
+    return {name: "\n".join(lines) + "\n" for name, lines in texts.items()}
 
 
 def settings(drive: Drive, motion: MotionSpec, angles: HomeAngles) -> list[Setting]:
@@ -169,33 +171,14 @@ def _klipper_homing(motion: MotionSpec, angles: HomeAngles) -> Iterator[str]:
 
 def klipper_config(drive: Drive, motion: MotionSpec, outputs: Iterable[str]) -> Iterator[str]:
     """A configuration to include; pins of the board are left to fill in."""
-    yield "# base of the prototype: degrees for millimetres; fill in the pins of the board"
-    yield "# zero pin in before RESTART, FIRMWARE_RESTART or the supply's switch: they let it fall"
-    yield "[printer]"
-    yield "kinematics: none"
-    yield "max_velocity: 1000"
-    yield "max_accel: 1000"
-    yield "[pause_resume]"
-    yield "[respond]"
-    yield "[idle_timeout]"
-    yield f"timeout: {IDLE_S}"
-    yield "gcode:"
-    yield '    RESPOND MSG="idle, the motor stays on"'
-    yield "[static_digital_output base_enable]"
-    yield f"pins: {PIN}"  # not enable_pin of the stepper, which a shutdown takes back
-    yield "[manual_stepper base]"
-    yield from (f"{name}_pin: {PIN}" for name in ("step", "dir"))
-    yield f"endstop_pin: ^{PIN}"  # normally closed to ground: high when pressed
-    yield "rotation_distance: 360"
+    yield from _TEMPLATE.read_text(encoding="utf-8").splitlines()
     yield f"gear_ratio: {drive.ratio:.7g}:1"
     yield f"full_steps_per_rotation: {drive.motor['full_steps']:.0f}"
     yield f"microsteps: {motion.microsteps}"
     yield f"velocity: {motion.feed_deg_min / MINUTE_S:g}"
     yield f"accel: {motion.acceleration_deg_s2:g}"
     for name in ("release", *outputs):
-        yield f"[output_pin {name}]"
-        yield f"pin: {PIN}"
-        yield "value: 0"
+        yield from (f"[output_pin {name}]", "pin: FILL_IN", "value: 0")
 
 
 MAX_LINE_LENGTH = 79

@@ -10,7 +10,13 @@ from tbcad.cad.drafting.sheet import A4, BESIDE_MM, Sheet, drawing_room, notes, 
 from tbcad.cad.formats.entities import Circle, Layer, Point
 from tbcad.core.geometry.primitives import Component, Cylinder, box
 from tbcad.core.geometry.rotations import bolt_circle
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import (
+    AssembledMachine,
+    Words,
+    planned,
+    told_words,
+    when,
+)
 from tbcad.prototype.base.fasteners import COUPLING_FLANGE_MM
 from tbcad.prototype.base.hub import PATTERNS, SCREW_MM, SOCKET_MM
 from tbcad.prototype.base.layout import BaseLayout
@@ -185,122 +191,57 @@ def motor_fasteners(site: Site, plate: HeadPlate) -> Iterator[Fastener]:
 @planned("Rotary stage on the head", "rotary_stage*")
 def table_step(machine: AssembledMachine) -> Words:
     """The rotary stage."""
-    does = "Screw the rotary stage on the head's front from behind, its turning side toward the "
-    check = "The stage turns by its knob or motor, and its top does not move when it is pushed."
-    return [f"{does}object."], [check]
+    return told_words(__name__, "table")
 
 
 @planned("Zero disc on the hub", "zero_disc", "wheel", "coupling")
 def hub_step(machine: AssembledMachine) -> Words:
     """Zero disc, and what drives it, on the hub."""
-    wheel = machine.has("wheel")
-    part = machine.listed(machine.bodies["wheel"]) if wheel else None
-    turns = f"the wheel of {part['teeth']:.0f} teeth" if part else "the wheel"
-    does = [
-        "Press the dowel half into the hole in the hub's face.",
-        f"Put the {machine.body_ref('zero_disc')} on it, arrow toward the hub: there is only one "
-        "way.",
-        _drilled(machine) if wheel else "",
-        when(machine.has("coupling"), "Fasten the coupling's flange behind the disc."),
-        when(
-            machine.has("rotary_stage"),
-            "Hold hub and disc against the top of the rotary stage, and screw them on from the "
-            "object's side.",
-        ),
-    ]
-    checks = [
-        "Hub and disc touch all round: no gap is seen.",
-        f"Turned by hand in front of a fixed pencil, {turns} does not wobble."
-        if wheel
-        else "The disc does not wobble when it is turned.",
-    ]
-    return does, checks
-
-
-def _drilled(machine: AssembledMachine) -> str:
-    sheet = machine.record.drawing_of(machine.bodies["wheel"])
-    drill = when(sheet, f"Drill the wheel as {sheet} shows. ")
-    text = f"{drill}Screw it on through its four holes: wheel, disc, inserts of the hub."
-    if not machine.has("shaft"):
-        return text
-    return (
-        f"{text} The shaft {machine.body_ref('shaft')} through wheel, disc and hub centres them "
-        "while the screws are tightened; pull it out again."
+    part = sheet = None
+    if wheel := machine.bodies.get("wheel"):
+        part, sheet = machine.listed(wheel), machine.record.drawing_of(wheel)
+    centred = machine.has("shaft") and (
+        f" The shaft {machine.body_ref('shaft')} through wheel, disc and hub centres them while "
+        "the screws are tightened; pull it out again."
+    )
+    return told_words(
+        __name__,
+        "hub",
+        disc=machine.body_ref("zero_disc"),
+        drill=when(sheet, f"Drill the wheel as {sheet} shows. "),
+        centred=centred or "",
+        wheel=wheel and (f"the wheel of {part['teeth']:.0f} teeth" if part else "the wheel"),
+        no_wheel=not wheel,
+        coupling=machine.has("coupling"),
+        stage=machine.has("rotary_stage"),
     )
 
 
 @planned("Base on its shaft", "shaft", "collar", loose=("belts",), near=NEAR_SHAFT)
 def shaft_step(machine: AssembledMachine) -> Words:
     """The base on its shaft."""
-    does = [
-        f"Push the shaft {machine.body_ref('shaft')} into the hub from behind until it ends in "
-        f"the bore. The last {SOCKET_MM:g} mm of the bore stay free: the gauge of the camera is "
-        "plugged in there later.",
-        "Tighten the screws of the hub in turn.",
-        when(
-            machine.has("wheel"),
-            "Lay the belt round the wheel now: once the shaft is in its bearings, it gets neither "
-            "past the base nor past the head.",
-        ),
-        "Push the shaft through both bearings, hub in front, the loop of the belt toward the "
-        "motor's place. Collar on its rear end, against the bearing; its set screw points down, "
-        "where the key reaches it.",
-    ]
-    checks = [
-        "The base turns freely by hand and falls back to where it is heaviest.",
-        "Pushed up along the axis and let go, the base slides back until the collar touches the "
-        "bearing: its weight keeps it there.",
-    ]
-    return does, checks
+    shaft, wheel = machine.body_ref("shaft"), machine.has("wheel")
+    return told_words(__name__, "shaft", shaft=shaft, socket_mm=SOCKET_MM, wheel=wheel)
 
 
 @planned("Motor", "motor", "pinion", near=("wheel",))
 def motor_step(machine: AssembledMachine) -> Words:
     """The motor, with belt, or straight on the shaft."""
-    if machine.has("pinion"):
-        return _belt(machine)
-    does = [
-        "Motor behind the head's plate, screws from the front.",
-        when(
-            machine.has("coupling"),
-            "Push the base with the coupling on the motor's shaft; tighten the set screws of the "
-            "coupling and of the hub.",
-        ),
-    ]
-    return does, ["Turned by hand, the base takes the motor's shaft along and does not slip on it."]
-
-
-def _belt(machine: AssembledMachine) -> Words:
-    drive = machine.record.drive
-    does = [
-        _pinion(machine),
-        "Motor behind the head's plate, the pinion through its hole and into the belt's loop. "
-        "Screws from the front, loosely in their slots.",
-        "Belt on both wheels. Pull the motor away from the shaft until the belt has its tone, then "
-        "tighten the screws in turn.",
-    ]
-    checks = [
-        f"The axes of motor and base are {drive.belt_centre_mm:.1f} mm apart.",
-        f"A free side of the belt, plucked like a string, sounds at {drive.belt_tone_hz:.0f} Hz (a "
-        f"tuner app; a pull of {drive.belt_tension_n:.0f} N).",
-        f"{drive.ratio:g} turns of the motor turn the base once.",
-    ]
-    return does, checks
-
-
-def _pinion(machine: AssembledMachine) -> str:
-    """Where the pinion is on the motor's shaft: its teeth in line with the wheel's."""
-    part, motor = (machine.listed(machine.bodies[body]) for body in ("pinion", "motor"))
-    if not (part and motor):
-        return ""
-    front = PLATE_MM + GAP_MM + part["width_mm"]
-    beyond = motor["shaft_length_mm"] - front
-    return (
-        f"Pinion {machine.body_ref('pinion')} on the motor's shaft, its hub with the set screws "
-        f"toward the motor, the end of its teeth {front:g} mm from the motor's face: they are then "
-        f"in line with the wheel's. A shaft of {motor['shaft_length_mm']:g} mm ends "
-        f"{abs(beyond):g} mm {'beyond' if beyond > 0 else 'before'} it. Tighten one set screw on "
-        "the shaft's flat, then the other: later the head's plate is round them."
+    if not machine.has("pinion"):
+        return told_words(__name__, "motor", coupling=machine.has("coupling"))
+    pinion, motor = (machine.listed(machine.bodies[body]) for body in ("pinion", "motor"))
+    front = PLATE_MM + GAP_MM + (pinion["width_mm"] if pinion else 0.0)
+    shaft = motor["shaft_length_mm"] if motor else 0.0
+    return told_words(
+        __name__,
+        "belt",
+        parts=pinion and motor,
+        pinion=machine.body_ref("pinion"),
+        front=front,  # so that the pinion's teeth are in line with the wheel's
+        shaft_mm=shaft,
+        apart=abs(shaft - front),
+        beyond="beyond" if shaft > front else "before",
+        drive=machine.record.drive,
     )
 
 

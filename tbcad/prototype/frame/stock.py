@@ -23,7 +23,13 @@ from tbcad.cad.drafting.sheet import rectangle as outline
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.core.geometry.primitives import Component, Primitive, box, rectangle
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import (
+    AssembledMachine,
+    Words,
+    planned,
+    told_words,
+    when,
+)
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import PartsList
 from tbcad.prototype.frame.shared import (
@@ -230,22 +236,17 @@ def shop_step(machine: AssembledMachine) -> Words:
     stock = machine.record.frame_stock
     plate, upright = map(machine.record.drawing_of, (stock.plate, stock.upright))
     black = ", ".join(one.name.replace("_", " ") for one in machine.record.bought if one.finish)
-    does = [
-        f"Drill the plate {machine.ref(stock.plate)} by {plate or HOLES} and tap M5 through.",
-        f"Saw both uprights {machine.ref(stock.upright)} to {stock.uprights_cut_to_mm:.1f} mm"
-        f"{when(upright, f' ({upright})')}: they are mounted later.",
-        "Deburr all edges.",
-        when(
-            black,
-            f"Paint, blacken or tape matt black what is not yet: {black}, heads of screws. Mask "
-            "threads, slots, bores, teeth and what bearings sit on.",
-        ),
-    ]
-    checks = [
-        f"An M5 screw turns by hand into each of the plate's holes ({HOLES} lists them).",
-        "Stood next to each other, both uprights are equally long to 0.2 mm.",
-    ]
-    return does, checks
+    return told_words(
+        __name__,
+        "shop",
+        stock=stock,
+        plate=machine.ref(stock.plate),
+        plate_drawing=plate or HOLES,
+        upright=machine.ref(stock.upright),
+        upright_drawing=when(upright, f" ({upright})"),
+        black=black,
+        holes=HOLES,
+    )
 
 
 @planned("Feet and uprights on the plate", "upright_*")
@@ -255,21 +256,8 @@ def frame_step(machine: AssembledMachine) -> Words:
     nuts = [one.along @ axis for one in machine.fasteners if machine.kind(one.part) == "tnuts"]
     # Screws go in from the front against the axis, which leans from the uprights to the camera.
     front = sum(along < 0 for along in nuts)
-    does = [
-        f"Slide all T-nuts into the slots of the uprights, {front // UPRIGHTS} in the front one "
-        f"(toward the camera) of each and {(len(nuts) - front) // UPRIGHTS} in the back one: one "
-        "at the lower end of each slot for a foot, the others for what comes later (the picture "
-        "shows which).",
-        "Stand the uprights between the two feet, the feet's flanges against them. Screws through "
-        "the feet into the T-nuts, loosely.",
-        "Screw the feet down on the plate, a washer under each head. Then tighten the T-nuts' "
-        "screws.",
-    ]
-    checks = [
-        "A square shows both uprights at a right angle to the plate in both directions.",
-        "The distance between them is the same at both ends to 0.5 mm.",
-    ]
-    return does, checks
+    back = len(nuts) - front
+    return told_words(__name__, "frame", front=front // UPRIGHTS, back=back // UPRIGHTS)
 
 
 def plate_sheet(stock: Stock, bill: PartsList) -> Sheet:

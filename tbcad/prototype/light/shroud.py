@@ -16,7 +16,7 @@ from tbcad.core.geometry.rotations import even_angles, rotated, unit_circle
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import LightSpec
 from tbcad.core.spec.section import AUTO
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, told_words
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.part import Part
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
@@ -216,21 +216,7 @@ def shroud_step(machine: AssembledMachine) -> Words:
     """The box of card."""
     box = machine.record.shroud
     assert box is not None
-    does = [
-        *(
-            f"Cut {one.dxf}: {one.what}, {one.size_mm[0]:.0f} x {one.size_mm[1]:.0f} mm."
-            for one in box.panels
-        ),
-        "Lay the floor under the plate first; cables go out through the notch of the back.",
-        "Score the dashed lines. Fold the flaps of front, back and right side inward by 90 degrees "
-        "and glue them. The left side is held by tape, so that it comes off: the object is placed "
-        "and turned through it.",
-    ]
-    checks = [
-        "No part touches the card over the whole travel of the base.",
-        "With the room lit and the lamps off, a long exposure stays black.",
-    ]
-    return does, checks
+    return told_words(__name__, "shroud", panels=[{"one": one} for one in box.panels])
 
 
 SHROUD = Part((shroud_step,))

@@ -3,7 +3,13 @@
 import numpy as np
 
 from tbcad.core.geometry.primitives import Component, Cylinder, Primitive, box, cylinder_between
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import (
+    AssembledMachine,
+    Words,
+    planned,
+    told_words,
+    when,
+)
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.shared import CLEARANCE_HOLE_MM, THROUGH_MM, drilled_holes
 from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
@@ -94,34 +100,26 @@ def _clamp(
 @planned("Object stage", "stage_*", loose=("WIRE-28", "WIRE-30"))
 def stage_step(machine: AssembledMachine) -> Words:
     """The object's stage with its LEDs; x is toward the camera, y to its right as it looks back."""
-    leds = machine.record.leds
-    does = [
-        when(
-            leds,
-            f"Solder two wires to each of the {len(leds)} LEDs, long one to anode, and mark the "
-            "anode. Push the LEDs into the crown's pockets from below, wires through the grooves "
-            "and the bore.",
-        ),
-        f"{when(leds, 'Wires through the post. ')}Crown into the post, set screw through the "
-        "post's wall.",
-        "Press the insert into the foot's ear. Foot on the plate with washers; clamp the post in "
-        f"it{', turned so that the LEDs stand as the checks say.' if leds else '.'}",
-        "Lay the disc on the crown's studs.",
-    ]
-    checks = [
-        "The disc lies flat, comes off by hand and fits turned by 180 degrees.",
-        *(
-            f"LED {number}: {abs(x):.0f} mm {'toward' if x > 0 else 'away from'} the camera, "
-            f"{abs(y):.0f} mm to the {'right' if y > 0 else 'left'} as the camera sees it, "
-            f"{abs(z):.0f} mm {'above' if z > 0 else 'below'} the object's centre."
-            for number, (x, y, z) in enumerate((led.position_mm for led in leds), 1)
-        ),
-        "The post does not turn in its clamp."
-        + when(leds, " A plug on the wires lets it be taken out."),
-        "The base passes the stage without touching it, over its whole travel by hand; then the "
-        "zero pin is in again.",
-    ]
-    return does, checks
+    leds = [_led_place(k, *one.position_mm) for k, one in enumerate(machine.record.leds, 1)]
+    return told_words(
+        __name__,
+        "stage",
+        leds=leds,
+        count=len(leds),
+        wired=when(leds, "Wires through the post. "),
+        turned=when(leds, ", turned so that the LEDs stand as the checks say"),
+        plugged=when(leds, " A plug on the wires lets it be taken out."),
+    )
+
+
+def _led_place(number: int, x: float, y: float, z: float) -> dict[str, object]:
+    """Where an LED is, seen from the camera."""
+    return {
+        "number": number,
+        **{"away": abs(x), "toward": "toward" if x > 0 else "away from"},
+        **{"aside": abs(y), "side": "right" if y > 0 else "left"},
+        **{"height": abs(z), "above": "above" if z > 0 else "below"},
+    }
 
 
 STAGE = Part((stage_step,), stage_foot, remedies={"stage_foot": "prototype.frame.floor_mm less"})

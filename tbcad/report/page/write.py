@@ -28,8 +28,8 @@ from tbcad.output.single_files import refuse_member
 from tbcad.prototype.files.bom import PartsList, read_parts_list
 from tbcad.records.design import MISSING
 from tbcad.records.document import Manifest
-from tbcad.report.page import bodies, mirrors
-from tbcad.report.page.mirrors import PackedArrays
+from tbcad.report.page import bodies
+from tbcad.report.page.bodies import PackedArrays
 from tbcad.report.page.pictures import Picture, photographs, pictures_html, read_pictures
 from tbcad.report.page.verdict import (
     Verdict,
@@ -160,9 +160,8 @@ def _data(
     manifest: Manifest,
     capture: Path | None,
 ) -> dict[str, Any]:
-    """What the scripts read."""
     arrays = PackedArrays()
-    table = mirrors.packed_mirrors(folder, verdict, arrays)
+    table = bodies.packed_mirrors(folder, verdict, arrays)
     facets = bodies.coarse_facets(export)
     shells = "shell_a.stl" in manifest.files
     drawn = bodies.packed_shells(export, facets, arrays) if shells else []

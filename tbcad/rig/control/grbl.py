@@ -202,7 +202,6 @@ class Grbl:
                 yield message
 
     def _refuse(self, message: Message, line: str) -> None:
-        """Raise what ends a run."""
         if message.kind == "error":
             self.pending = ""
             raise MachineFault(f"the controller refuses {told(line, message)}")

@@ -202,7 +202,6 @@ class KlipperBase:
         self._klipper.script(DONE)
 
     def _search(self) -> None:
-        """Turn down until the switch is pressed."""
         homing = self._files.homing
         for angle in self._pieces(0.0, homing.travel_deg, homing.speed_deg_s):
             if self._klipper.switch_pressed():

@@ -8,8 +8,14 @@ from hypothesis import strategies as st
 
 import tbcad
 from tbcad.core.geometry.vectors import dot, norm, unit
-from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design, numbered_directions
-from tbcad.core.mirrors.clearance import closest_passage, passing_distances
+from tbcad.core.mirrors.array import (
+    MirrorArray,
+    MirrorDesign,
+    closest_passage,
+    design,
+    numbered_directions,
+    passing_distances,
+)
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec

@@ -7,7 +7,7 @@ from tbcad.core.mirrors.array import MirrorArray
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.core.spec.load import load_spec
 from tbcad.prototype.balls.catalogue import load_catalogue
-from tbcad.prototype.balls.clearance import (
+from tbcad.prototype.balls.placement import (
     SOLVER_MARGIN,
     allowed_azimuths,
     min_separations,

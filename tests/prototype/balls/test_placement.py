@@ -7,9 +7,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.balls.clearance import SOLVER_MARGIN
 from tbcad.prototype.balls.placement import (
     SLACK,
+    SOLVER_MARGIN,
     PlacementProblem,
     greedy_placement,
     min_swing_placement,

@@ -10,13 +10,13 @@ import pytest
 from tbcad.core.geometry.primitives import Component, Cylinder
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.errors import SpecError
+from tbcad.prototype.arrangement import frame_layout
 from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.base.split import UNCUT
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.frame.camera_mount import CameraMount
 from tbcad.prototype.frame.head import BearingHead, bearing_head
-from tbcad.prototype.frame.layout import frame_layout
 from tbcad.prototype.frame.stock import Stock
 from tbcad.prototype.keepout import keep_out_volume
 from tbcad.prototype.part import FrameLayout, Site, frame_axes

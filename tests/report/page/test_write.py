@@ -18,7 +18,7 @@ from tbcad.app.cli import run
 from tbcad.errors import InputError
 from tbcad.output.manifest import fingerprint
 from tbcad.output.single_files import foreign_files
-from tbcad.report.page.mirrors import KINDS, PackedArrays
+from tbcad.report.page.bodies import KINDS, PackedArrays
 from tbcad.report.page.write import MAX_BYTES, page, write_report
 from tests.exported_files import read_csv
 

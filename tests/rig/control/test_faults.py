@@ -291,7 +291,6 @@ def test_full_disk(rig: Rig, monkeypatch: pytest.MonkeyPatch, stopped: Told) -> 
 
 @pytest.mark.slow
 def test_three_kills(either_rig: Rig) -> None:
-    """Forty of them, with the virtual camera, are in test_whole_loop."""
     rig, kills = either_rig, 3
     killed_run(rig, rig.copying, stops=1, kills=kills, seed=1)
     check_every_photograph(rig.out, PER_STOP)
