@@ -156,20 +156,20 @@ def _read_steps(export: Export, processes: Processes) -> Steps:
 
 
 def _compare_steps(export: Export, results: CollectedResults, steps: Callable[[], Steps]) -> None:
-    wait, masses = cache(steps), results.masses
+    masses = results.masses
     if any(part.step for part in export.parts):
         results.add(Results(stages=["STEP"]))
-        _, fronts, areas = wait()
+        _, fronts, areas = steps()
         recorded = areas + radius_checks(export, results.mirrors.get("coverage_fitted_mm"))
         solids = front_step_checks(export, export.parts, masses, fronts)
         results.add(Results(checks=recorded + solids))
     if any(part.step for part in export.mandrels):
         results.add(Results(stages=["STEP of the mandrels"]))
-        solids = front_step_checks(export, export.mandrels, masses, wait()[1])
+        solids = front_step_checks(export, export.mandrels, masses, steps()[1])
         results.add(Results(checks=solids))
     if any(part.step for part in export.printed):
         results.add(Results(stages=["STEP of the prototype"]))
-        results.add(Results(checks=part_step_checks(export, masses, wait()[0])))
+        results.add(Results(checks=part_step_checks(export, masses, steps()[0])))
 
 
 def _refuse_changes(export: Export, before: Stamps) -> None:
