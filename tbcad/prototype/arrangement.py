@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tbcad.core.camera.sheet import RigLight
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
@@ -33,6 +34,8 @@ from tbcad.prototype.drive.balance import (
 from tbcad.prototype.drive.drive import Drive, base_torques, choose_drive, load_drives
 from tbcad.prototype.electronics import led_circuit
 from tbcad.prototype.fasteners import Fastener, numbered
+from tbcad.prototype.frame.camera_mount import CameraMount
+from tbcad.prototype.frame.chosen_camera import chosen_camera, with_camera
 from tbcad.prototype.frame.layout import frame_layout
 from tbcad.prototype.frame.stock import Stock
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
@@ -74,6 +77,13 @@ class PrototypeModel(Site):
         )
 
     @property
+    def rig_light(self) -> RigLight:
+        """What there is for its camera."""
+        lamps, mount = self.frame.find(LampLayout), self.frame.find(CameraMount)
+        named = mount.chosen.name if mount and mount.chosen else None
+        return RigLight(lamps.lux if lamps else None, named)
+
+    @property
     def purchased(self) -> dict[str, int]:
         """Quantity of purchased parts by name, without balls and drive."""
         counts = Counter(one.part.name for one in self.fasteners)
@@ -91,6 +101,7 @@ def arrangements(design: MirrorDesign) -> Iterator[PrototypeModel]:
     tried.
     """
     tried, arranged, errors = list[int](), False, list[SpecError]()
+    chosen_camera(design.spec, design.arrays[0])  # refused whatever the balls
     for spec, outcome in _attempts(design):
         tried.append(int(spec.prototype.k))
         if isinstance(outcome, PrototypeModel):
@@ -235,8 +246,9 @@ def _arranged(site: Site, balance: BaseBalance) -> PrototypeModel:
     shroud, lamps = shroud_round(site, frame), frame.find(LampLayout)
     lamp_z = float(lamps.places[0, 2]) if lamps else 0.0
     light = {"lamp_z_mm": lamp_z, "shroud": shroud is not None}
+    chosen = with_camera(spec, site.layout.array)
     known = vars(site) | {
-        "spec": _with(spec, light=spec.prototype.light.model_copy(update=light)),
+        "spec": _with(chosen, light=spec.prototype.light.model_copy(update=light)),
         "split": split_base(site.base, spec.printer),
     }
     return PrototypeModel(**known, balance=balance, frame=frame, shroud=shroud)

@@ -8,7 +8,7 @@ from tbcad.prototype.keepout import min_distance
 from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.registry import FRAME, PARTS
 
-MAY_BE_LIT = ("camera",)  # light goes into it
+MAY_BE_LIT = ("camera", "camera_lens")  # light goes into them
 REMEDY = "prototype.frame.uprights_mm or prototype.largest_ball_mm smaller"
 
 
