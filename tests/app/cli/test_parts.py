@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from tbcad.app.cli import run
-from tbcad.core.camera.sheet import CAMERA_COLUMNS
+from tbcad.core.camera.lists import CAMERA_COLUMNS
 from tbcad.prototype.files.bom import COLUMNS
 from tbcad.prototype.purchased.parts import PRICE_FIELDS as PRICE_FILE
 
@@ -85,7 +85,7 @@ def test_lines_of_the_sheet(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_users_camera_is_a_candidate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "mine.csv"
-    file.write_text(",".join(CAMERA_COLUMNS) + "\nMine,Sony E,36,24,30000,20000,usb,me\n")
+    file.write_text(",".join(CAMERA_COLUMNS) + "\nMine,Sony E,36,24,30000,20000,usb,,,,,,,,me\n")
     assert run(["camera", "--n", "6", "--cameras", str(file), "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert record["candidates"][0]["camera"] == "Mine"

@@ -453,12 +453,16 @@ FAILING: Broken = {
             "along_axis_mm",
         ),
         "camera: another place of its thread": (
-            at(f"{SPEC}frame/camera_screw_mm", 55.0, DESIGN),
+            at(f"{SPEC}frame/camera_screw_mm", 60.0, DESIGN),
             "the tripod slot is elsewhere",
         ),
         "camera: another length": (
-            at(f"{SPEC}camera_length_mm", 120.0, DESIGN),
-            "the fence is 100.00 mm behind",
+            at(f"{SPEC}frame/camera_back_mm", 120.0, DESIGN),
+            "the fence is 78.90 mm behind",
+        ),
+        "camera: too high over its plate": (
+            at(f"{SPEC}frame/camera_axis_mm", 25.0, DESIGN),
+            "the camera stands 22.50 mm from its axis",
         ),
     },
     ("camera gauge", RECORD): {
@@ -496,6 +500,9 @@ FAILING: Broken = {
         "a screw's head in a web": (drawn_away("M5x16_9", 0, 3.0), "M5x16_9 and camera_bracket"),
         "an upright in the belt": (drawn_away("pinion", -160.0, 80.0), "belt and upright_left"),
         "the camera in its bracket": (drawn_away("camera", 40.0), "camera and camera_bracket"),
+        "the camera through its fence": (drawn_away("camera", 1.0, 0, -6.0), "camera and camera_f"),
+        "the camera too high": (drawn_away("camera", 5.0), "camera and camera_riser"),
+        "the lens in its camera": (drawn_away("camera_lens", 1.0, 0, -6.0), "camera and camera_l"),
         "a lamp in its stand": (drawn_away("lamp_1", 2.0), "lamp_1 and lamp_stand_1"),
         "two inserts in one place": (
             drawn_away("INSERT_M3_1", -14.0, 0.0, -14.0),

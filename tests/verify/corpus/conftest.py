@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tbcad.app.cli import run
+from tbcad.core.camera.lists import LENS_COLUMNS
 from tests.verify.corpus.copies import digests
 from tests.verify.corpus.readings import remembered
 
@@ -39,7 +40,10 @@ def meshes_alone() -> None:
 def good_prototype(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A small prototype as `tbcad build` writes it; tests break copies of it only."""
     folder = tmp_path_factory.mktemp("corpus") / "prototype"
-    options = [word for setting in PROTOTYPE_SETTINGS for word in ("--set", setting)]
+    lenses = folder.parent / "lenses.csv"  # a lens wide enough for a camera of the list
+    lenses.write_text(f"{','.join(LENS_COLUMNS)}\nwide,C,6,6,1.8,16,0.174,20,54,57,215,test\n")
+    settings = (*PROTOTYPE_SETTINGS, f"prototype.frame.lenses={lenses}")
+    options = [word for setting in settings for word in ("--set", setting)]
     words = ["build", "--parts", "prototype", "--no-verify", *options, "--out", str(folder)]
     assert run(words) == 0
     before = digests(folder)
