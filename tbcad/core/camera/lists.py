@@ -106,9 +106,9 @@ def _camera(where: str, row: Row) -> CameraBody:
     width, height, columns, rows = (
         positive_number(where, row, size, MAX_VALUE) for size in CAMERA_SIZES
     )
-    outline = {size: _known(where, row, size) for size in BODY_SIZES}
+    outline = (_known(where, row, size) for size in BODY_SIZES)
     named = row["name"], mount, width, height, columns, rows, row["control"], source
-    return CameraBody(*named, row["trigger"], **outline)
+    return CameraBody(*named, row["trigger"], *outline)
 
 
 def _lens(where: str, row: Row) -> RectilinearLens:
@@ -122,9 +122,9 @@ def _lens(where: str, row: Row) -> RectilinearLens:
             )
     mounts = tuple(required_text(where, row, "mounts").split("|"))
     source = required_text(where, row, "source")
-    barrel = {size: _known(where, row, size) for size in BARREL_SIZES}
+    barrel = (_known(where, row, size) for size in BARREL_SIZES)
     figures = short, long, wide_open, stopped, 1000 * metres, circle
-    return RectilinearLens(row["name"], mounts, *figures, source, **barrel)
+    return RectilinearLens(row["name"], mounts, *figures, source, *barrel)
 
 
 def _known(where: str, row: Row, size: str) -> float | None:

@@ -250,13 +250,13 @@ def _camera(place: _Place) -> tuple[Component, ...]:
     """The camera's outline and its lens, or a cylinder in their place."""
     camera, chosen = place.camera, place.chosen
     if chosen is None:
-        body = Cylinder(camera.pinhole, -camera.forward, place.axis, place.back)
-        return (Component("camera", "camera behind its pinhole", (body,)),)
+        stand_in = Cylinder(camera.pinhole, -camera.forward, place.axis, place.back)
+        return (Component("camera", "camera behind its pinhole", (stand_in,)),)
     body, lens, wide = chosen.best.camera, chosen.best.lens, chosen.half_width
     top = place.axis - (body.body_height_mm or 0.0)
     outline = place.block((chosen.flange, -wide, top), (chosen.back, wide, place.axis))
-    ends = (place.point(back, 0.0, 0.0) for back in (chosen.front, chosen.flange))
-    barrel = cylinder_between(*ends, chosen.lens_radius)
+    start, end = (place.point(back, 0.0, 0.0) for back in (chosen.front, chosen.flange))
+    barrel = cylinder_between(start, end, chosen.lens_radius)
     return (
         Component("camera", body.name, (outline,)),
         Component("camera_lens", lens.name, (barrel,)),
