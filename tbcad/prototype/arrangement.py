@@ -34,8 +34,8 @@ from tbcad.prototype.drive.balance import (
 from tbcad.prototype.drive.drive import Drive, base_torques, choose_drive, load_drives
 from tbcad.prototype.electronics import led_circuit
 from tbcad.prototype.fasteners import Fastener, numbered
-from tbcad.prototype.frame.camera_mount import CameraMount
-from tbcad.prototype.frame.chosen_camera import chosen_camera, with_camera
+from tbcad.prototype.frame.camera_mount import CameraMount, check_camera
+from tbcad.prototype.frame.chosen_camera import with_camera
 from tbcad.prototype.frame.layout import frame_layout
 from tbcad.prototype.frame.stock import Stock
 from tbcad.prototype.keepout import KeepOut, keep_out_volume
@@ -101,7 +101,7 @@ def arrangements(design: MirrorDesign) -> Iterator[PrototypeModel]:
     tried.
     """
     tried, arranged, errors = list[int](), False, list[SpecError]()
-    chosen_camera(design.spec, design.arrays[0])  # refused whatever the balls
+    check_camera(design.spec, design.arrays[0], load_parts())
     for spec, outcome in _attempts(design):
         tried.append(int(spec.prototype.k))
         if isinstance(outcome, PrototypeModel):

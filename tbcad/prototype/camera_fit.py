@@ -80,8 +80,8 @@ def _fit(model: PrototypeModel) -> CameraFit:
         rounded,
         (
             f"{light.mounted} fits",
-            f"axis      {frame.camera_axis_mm:g} mm over what the camera stands on, a riser of "
-            f"{mount.riser:g} mm",
+            f"axis      {frame.camera_axis_mm:g} mm over what the camera stands on, "
+            + (f"a riser of {mount.riser:g} mm" if mount.riser else "no riser"),
             f"thread    {frame.camera_screw_mm:g} mm behind the pinhole, fence at the back at "
             f"{frame.camera_back_mm:g} mm",
             f"lens      from {-mount.chosen.front:.1f} mm before the pinhole; nothing that turns "

@@ -26,7 +26,9 @@ from tbcad.core.geometry.primitives import (
     slot,
 )
 from tbcad.core.geometry.vectors import unit
+from tbcad.core.mirrors.array import MirrorArray
 from tbcad.core.optics.camera import Camera
+from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
@@ -44,7 +46,7 @@ from tbcad.prototype.frame.shared import (
     level_prism,
     webs,
 )
-from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
+from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site, frame_axes
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.records.prototype import CameraTravel
 from tbcad.types import Floats
@@ -220,17 +222,15 @@ def camera_mount(site: Site, _: FrameLayout) -> CameraMount | None:
     lies beyond its end, or camera or mount reach the base plate.
     """
     array, parts = site.layout.array, site.parts
-    if not site.spec.prototype.camera_diameter_mm:
+    place = _checked_place(site.spec, array, site.axes, parts)
+    if place is None:
         return None
-    spec, chosen = with_camera(site.spec, array).prototype, chosen_camera(site.spec, array)
-    place = _Place(spec, site.axes, array.camera, parts[INSERT], chosen)
-    bodies = _camera(place)
-    _check_camera(place, bodies)
+    spec = place.spec
     play = float(np.degrees(np.arctan((M5_HOLE_MM - M5_MM) / spec.frame.flange_mm)))
     return CameraMount(
         brackets=(_bracket(place),),
         printed=(_plate(place, parts), *_riser(place), _fence(place)),
-        purchased=bodies,
+        purchased=_camera(place),
         fasteners=_fasteners(place, parts),
         travel=CameraTravel(
             along_axis_mm=place.along,
@@ -241,9 +241,23 @@ def camera_mount(site: Site, _: FrameLayout) -> CameraMount | None:
             roll_deg=min(ROLL_DEG, play),
             pitch_deg=min(PITCH_DEG, play),
         ),
-        chosen=chosen,
+        chosen=place.chosen,
         riser=place.riser,
     )
+
+
+def check_camera(spec: Spec, array: MirrorArray, parts: Parts) -> None:
+    """Refuse a camera that no arrangement of balls has room for; SpecError as of `camera_mount`."""
+    _checked_place(spec, array, frame_axes(unit(array.camera.pinhole)), parts)
+
+
+def _checked_place(spec: Spec, array: MirrorArray, axes: Floats, parts: Parts) -> _Place | None:
+    if not spec.prototype.camera_diameter_mm:
+        return None
+    keys, chosen = with_camera(spec, array).prototype, chosen_camera(spec, array)
+    place = _Place(keys, axes, array.camera, parts[INSERT], chosen)
+    _check_camera(place, _camera(place))
+    return place
 
 
 def _camera(place: _Place) -> tuple[Component, ...]:
