@@ -101,7 +101,6 @@ def arrangements(design: MirrorDesign) -> Iterator[PrototypeModel]:
     tried.
     """
     tried, arranged, errors = list[int](), False, list[SpecError]()
-    check_camera(design.spec, design.arrays[0], load_parts())
     for spec, outcome in _attempts(design):
         tried.append(int(spec.prototype.k))
         if isinstance(outcome, PrototypeModel):
@@ -139,6 +138,7 @@ def _attempts(design: MirrorDesign) -> Iterator[Outcome]:
     parts, choices = load_parts(), BallChoices(design.spec, design.arrays[0])
     for k in ball_counts(design.spec, design, choices):
         spec = _with(design.spec, k=k)
+        check_camera(spec, design.arrays[0], parts)  # what none of the attempts has room for
         try:
             layout = prototype_layout(spec, design, k, choices)
         except SpecError as error:

@@ -43,7 +43,9 @@ def camera(
 
     given = {"camera": use, "cameras": cameras, "lenses": lenses}
     options = list(settings or []) + ([f"optics.n={n}"] if n is not None else [])
-    options += [f"prototype.frame.{key}={value}" for key, value in given.items() if value]
+    options += [
+        f"prototype.frame.{key}={value}" for key, value in given.items() if value is not None
+    ]
     spec = load_spec(design, options)
 
     from tbcad.app.api import design as mirror_design
