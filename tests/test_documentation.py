@@ -19,7 +19,7 @@ from markdown_it.token import Token
 
 import tbcad.app.cli  # noqa: F401 - adds all commands
 from tbcad.app.cli import run
-from tbcad.core.camera.sheet import CAMERA_COLUMNS, LENS_COLUMNS
+from tbcad.core.camera.lists import CAMERA_COLUMNS, LENS_COLUMNS
 from tests.app.cli.commands import commands
 
 ROOT = Path(__file__).parents[1]

@@ -71,6 +71,8 @@ def write_export(
             submit_file(write_shell_solids, design, envelope, folder)
         else:
             write_shell_solids(design, envelope, folder, progress)
+    # The prototype's light and mount are in its own, which replaces it.
+    write_camera_sheet(folder, design.arrays[0], design.spec.optics.capture_diameter_mm / 2)
     if PROTOTYPE in parts:
         try:
             export = replace(export, spec=export_prototype(design, folder, progress, submit_file))
@@ -85,7 +87,6 @@ def write_export(
             progress("shells")
     if mandrel:
         submit_file(write_mandrels, design, mandrel, folder)
-    write_camera_sheet(folder, design.arrays[0], design.spec.optics.capture_diameter_mm / 2)
     for future in pending:
         future.result()
     if mandrel and mandrel.draft.angle < 0:

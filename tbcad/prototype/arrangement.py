@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tbcad.core.camera.sheet import RigLight
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
@@ -34,6 +35,8 @@ from tbcad.prototype.drive.balance import (
 from tbcad.prototype.drive.drive import Drive, base_torques, choose_drive, load_drives
 from tbcad.prototype.electronics import led_circuit
 from tbcad.prototype.fasteners import Fastener, numbered
+from tbcad.prototype.frame.camera_mount import CameraMount, check_camera
+from tbcad.prototype.frame.chosen_camera import with_camera
 from tbcad.prototype.frame.stock import Stock
 from tbcad.prototype.keepout import KeepOut, keep_out_volume, min_distance
 from tbcad.prototype.light.lamp import LampLayout
@@ -73,6 +76,13 @@ class PrototypeModel(Site):
                 *stage_fasteners(self.stage, parts),
             )
         )
+
+    @property
+    def rig_light(self) -> RigLight:
+        """What there is for its camera."""
+        lamps, mount = self.frame.find(LampLayout), self.frame.find(CameraMount)
+        named = mount.chosen.name if mount and mount.chosen else None
+        return RigLight(lamps.lux if lamps else None, named)
 
     @property
     def purchased(self) -> dict[str, int]:
@@ -129,6 +139,7 @@ def _attempts(design: MirrorDesign) -> Iterator[Outcome]:
     parts, choices = load_parts(), BallChoices(design.spec, design.arrays[0])
     for k in ball_counts(design.spec, design, choices):
         spec = _with(design.spec, k=k)
+        check_camera(spec, design.arrays[0], parts)  # what none of the attempts has room for
         try:
             layout = prototype_layout(spec, design, k, choices)
         except SpecError as error:
@@ -236,8 +247,9 @@ def _arranged(site: Site, balance: BaseBalance) -> PrototypeModel:
     shroud, lamps = shroud_round(site, frame), frame.find(LampLayout)
     lamp_z = float(lamps.places[0, 2]) if lamps else 0.0
     light = {"lamp_z_mm": lamp_z, "shroud": shroud is not None}
+    chosen = with_camera(spec, site.layout.array)
     known = vars(site) | {
-        "spec": _with(spec, light=spec.prototype.light.model_copy(update=light)),
+        "spec": _with(chosen, light=spec.prototype.light.model_copy(update=light)),
         "split": split_base(site.base, spec.printer),
     }
     return PrototypeModel(**known, balance=balance, frame=frame, shroud=shroud)
@@ -273,7 +285,7 @@ def _open_keys(spec: Spec) -> dict[str, object]:
     return {"k": spec.prototype.k} | {f"base.{key}": getattr(base, key) for key in OPEN_BASE_KEYS}
 
 
-MAY_BE_LIT = ("camera",)  # light goes into it
+MAY_BE_LIT = ("camera", "camera_lens")  # light goes into them
 REMEDY = "prototype.frame.uprights_mm or prototype.largest_ball_mm smaller"
 
 

@@ -34,7 +34,12 @@ CHOSEN: dict[str, dict[str, Any]] = {
     "base": {"pad_angle_deg": 50.0, "hold": "magnet", "hub_boss_mm": 20.0},
     "stage": {"top_mm": -20.0, "disc_mm": 17.0, "object_diameter_mm": 40.0, "leds_mm": []},
     "light": {"lamp_z_mm": 0.0, "shroud": False},
-    "frame": {"floor_mm": -230.0},
+    "frame": {
+        "floor_mm": -230.0,
+        "camera_axis_mm": 30.0,
+        "camera_back_mm": 100.0,
+        "camera_screw_mm": 50.0,
+    },
 }
 MANIFEST_SCHEMA = "tbcad-manifest/1"
 PIN = np.array([100.0, 0.0, -100.0])

@@ -4,11 +4,16 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+from tbcad.core.camera.lists import (
+    FLANGE_MM,
+    CameraBody,
+    RectilinearLens,
+    load_cameras,
+    load_lenses,
+)
 from tbcad.core.camera.requirements import (
     WIDE_OPEN,
     CameraRequirements,
@@ -18,119 +23,19 @@ from tbcad.core.camera.requirements import (
     lens_for,
 )
 from tbcad.core.mirrors.array import MirrorArray
-from tbcad.core.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
-from tbcad.core.spec.errors import SpecError
 
-CAMERA_SIZES = ("sensor_width_mm", "sensor_height_mm", "width_px", "height_px")
-CAMERA_COLUMNS = ("name", "mount", *CAMERA_SIZES, "control", "source")
-LENS_SIZES = (
-    *("focal_min_mm", "focal_max_mm", "f_number_min", "f_number_max"),
-    *("min_focus_m", "image_circle_mm"),
-)
-LENS_COLUMNS = ("name", "mounts", *LENS_SIZES, "source")
-MAX_VALUE = 1e5  # of any figure
-_MIRRORLESS = ("Canon RF", "Nikon Z", "Sony E", "Fujifilm G")
-# Mounts on which lenses of another mount sit by a plain ring, which keeps the lens's distance.
-ADAPTERS = {
-    "Canon EF": _MIRRORLESS,
-    "Canon EF-S": ("Canon RF", "Sony E"),
-    "Nikon F": (*_MIRRORLESS, "Canon EF"),
-    "C": ("CS",),
-}
 ENOUGH = 0.999  # of an angle or of pixels: figures of makers are rounded
 MAX_CLOSE_UP_DPT = 10.0  # the strongest close-up lens on sale
+# Of a lens's length from its front to its entrance pupil: an estimate, for no list has it. The
+# mount moves the camera along its axis.
+PUPIL_OF_LENGTH = 0.3
 MAX_BLUR = 1.5  # times the least blur that a stop can reach
 SCHEMA = "tbcad-camera/1"
 CAMERA_FILE = "camera.json"
-LUX, ISO = 10_000.0, 400.0  # of the exposure that the sheet states
+ISO = 400.0  # of the exposure that the sheet states
+LUX = 1000.0  # of its light where there are no lamps: about that of the default prototype's
 DIGITS = 9
 SHOWN = 6  # candidates that the lines list
-
-
-@dataclass(frozen=True)
-class CameraBody:
-    """A camera with square pixels."""
-
-    name: str  # maker and model
-    mount: str  # of lenses
-    width_mm: float  # of the sensor's picture
-    height_mm: float  # of it
-    width_px: float  # its columns
-    height_px: float  # its rows
-    control: str  # by which a computer triggers it
-    source: str  # of the figures
-
-    @property
-    def pixel_mm(self) -> float:
-        """Width of a pixel."""
-        return self.width_mm / self.width_px
-
-
-@dataclass(frozen=True)
-class RectilinearLens:
-    """A lens that keeps straight lines straight."""
-
-    name: str  # maker and model
-    mounts: tuple[str, ...]  # in which it is sold
-    focal_min_mm: float  # shortest focal length, for a distant object
-    focal_max_mm: float  # longest; the same where it does not zoom
-    f_number_min: float  # fully open at the shortest focal length
-    f_number_max: float  # fully stopped down
-    min_focus_mm: float  # smallest distance from the sensor to what is in focus
-    image_circle_mm: float  # diagonal of the sensor that it covers
-    source: str  # of the figures
-
-    def fits(self, mount: str) -> bool:
-        """Whether it sits on a mount, by itself or by an adapter without optics."""
-        return any(mount == own or mount in ADAPTERS.get(own, ()) for own in self.mounts)
-
-
-def load_cameras(user_list: Path | None = None) -> list[CameraBody]:
-    """Cameras of the built-in list, then of a user's; InputError names the line and column."""
-    return [_camera(*one) for one in _rows("cameras.csv", user_list, CAMERA_COLUMNS, CAMERA_SIZES)]
-
-
-def load_lenses(user_list: Path | None = None) -> list[RectilinearLens]:
-    """Lenses of the built-in list, then of a user's; errors as of `load_cameras`."""
-    return [_lens(*one) for one in _rows("lenses.csv", user_list, LENS_COLUMNS, LENS_SIZES)]
-
-
-def _camera(where: str, row: Row) -> CameraBody:
-    mount, source = (required_text(where, row, column) for column in ("mount", "source"))
-    width, height, columns, rows = (
-        positive_number(where, row, size, MAX_VALUE) for size in CAMERA_SIZES
-    )
-    return CameraBody(row["name"], mount, width, height, columns, rows, row["control"], source)
-
-
-def _lens(where: str, row: Row) -> RectilinearLens:
-    short, long, wide_open, stopped, metres, circle = (
-        positive_number(where, row, size, MAX_VALUE) for size in LENS_SIZES
-    )
-    for low, high, name in ((short, long, "focal_max_mm"), (wide_open, stopped, "f_number_max")):
-        if high < low:
-            raise SpecError(
-                f"{where}, column {name}: {high:g}, allowed is {low:g} or more: correct it"
-            )
-    mounts = tuple(required_text(where, row, "mounts").split("|"))
-    source = required_text(where, row, "source")
-    return RectilinearLens(
-        row["name"], mounts, short, long, wide_open, stopped, 1000 * metres, circle, source
-    )
-
-
-def _rows(
-    name: str, user_list: Path | None, columns: tuple[str, ...], sizes: tuple[str, ...]
-) -> list[tuple[str, Row]]:
-    lists: list[tuple[Path | Traversable, str]] = [(files("tbcad.core.camera") / name, name)]
-    if user_list is not None:
-        lists.append((user_list, str(user_list)))
-    names: set[str] = set()
-    rows = [row for file, shown in lists for row in read_rows(file, shown, columns, sizes)]
-    for where, row in rows:
-        required_text(where, row, "name")
-        check_unique(where, row, "name", names)
-    return rows
 
 
 @dataclass(frozen=True)
@@ -147,6 +52,19 @@ class Candidate:
     total_px: float  # blur with diffraction at both ends of the depth, in pixels of the design
     close_up_dpt: float  # power of the close-up lens without which it does not focus; 0: none
     faults: tuple[str, ...]  # why it does not do; empty: it does
+
+
+@dataclass(frozen=True)
+class RigLight:
+    """What a prototype has for its camera: light, and a mount."""
+
+    lux: float | None = None  # on upright surfaces of the object; None: there are no lamps
+    mounted: str | None = None  # camera with its lens that mount and fence are made for
+
+    def exposure(self, one: Candidate) -> float:
+        """Seconds of a mid-grey object in this light, or in LUX."""
+        lux = LUX if self.lux is None else self.lux
+        return exposure_seconds(one.f_number, one.magnification, lux, ISO)
 
 
 def candidates(
@@ -184,23 +102,39 @@ def _candidate(needed: CameraRequirements, camera: CameraBody, lens: Rectilinear
         pixels_across=2 * across * image / camera.pixel_mm,
         f_number=f_number,
         total_px=aperture_stop(design, needed.depths, focal / f_number)["total_px"],
-        close_up_dpt=_close_up(needed.focus_mm, focal, lens.min_focus_mm, image),
+        close_up_dpt=_close_up(needed.focus_mm, focal, lens, _to_sensor(camera, lens, image)),
         faults=(),
     )
     return replace(one, faults=tuple(_faults(needed, one, image)))
 
 
-def _close_up(focus: float, focal: float, min_focus: float, image: float) -> float:
+def _close_up(focus: float, focal: float, lens: RectilinearLens, to_sensor: float) -> float:
     """Power that brings the lens's nearest focus to the one needed, dioptres; 0 where it is nearer.
 
-    Makers count the nearest focus from the sensor. The entrance pupil of a wide-angle lens is
-    farther from it than a thin lens would be, so the power is an upper bound.
+    Makers count the nearest focus from the sensor.
     """
-    if min_focus <= focus + image:
+    min_focus = lens.min_focus_mm
+    if min_focus <= focus + to_sensor:
         return 0.0
     # Object and image distance of a thin lens add up to the distance that the maker states.
     nearest = (min_focus + math.sqrt(max(min_focus**2 - 4 * focal * min_focus, 0.0))) / 2
     return max(1000 / focus - 1000 / nearest, 0.0)
+
+
+def behind_pupil(camera: CameraBody, lens: RectilinearLens) -> float | None:
+    """From the entrance pupil to the body's mount, mm; None of a lens whose length is not known."""
+    if lens.length_mm is None:
+        return None
+    return (1 - PUPIL_OF_LENGTH) * lens.length_mm + lens.ring_mm(camera.mount)
+
+
+def _to_sensor(camera: CameraBody, lens: RectilinearLens, image: float) -> float:
+    """From the entrance pupil to the sensor, mm; of a thin lens where the sizes are not known.
+
+    The entrance pupil of a wide-angle lens is farther from the sensor than a thin lens would be.
+    """
+    behind, flange = behind_pupil(camera, lens), FLANGE_MM.get(camera.mount)
+    return image if behind is None or flange is None else max(image, behind + flange)
 
 
 def _faults(needed: CameraRequirements, one: Candidate, image: float) -> Iterator[str]:
@@ -218,11 +152,13 @@ def _faults(needed: CameraRequirements, one: Candidate, image: float) -> Iterato
         yield f"F/{one.f_number:g} blurs by {one.total_px:.1f} pixels"
 
 
-def write_camera_sheet(folder: Path, array: MirrorArray, radius: float) -> None:
+def write_camera_sheet(
+    folder: Path, array: MirrorArray, radius: float, light: RigLight | None = None
+) -> None:
     """Write camera.json: camera a's requirements, cameras with lenses of the built-in lists."""
     needed = camera_requirements(array, radius)
     best = best_lenses(needed, load_cameras(), load_lenses())
-    text = json.dumps(sheet_record(needed, best), indent=1) + "\n"
+    text = json.dumps(sheet_record(needed, best, light or RigLight()), indent=1) + "\n"
     (folder / CAMERA_FILE).write_text(text, encoding="utf-8")
 
 
@@ -236,30 +172,36 @@ def best_lenses(
     return list(best.values())
 
 
-def sheet_record(needed: CameraRequirements, found: Iterable[Candidate]) -> dict[str, Any]:
+def sheet_record(
+    needed: CameraRequirements, found: Iterable[Candidate], light: RigLight
+) -> dict[str, Any]:
     """What camera.json holds."""
+    lux = LUX if light.lux is None else round(light.lux, 1)
     return {
         "schema": SCHEMA,
         "requirements": _rounded(asdict(needed)),
-        "exposure": {"illuminance_lux": LUX, "iso": ISO},
-        "candidates": [_candidate_record(one) for one in found],
+        "exposure": {"illuminance_lux": lux, "iso": ISO},
+        "mounted": light.mounted,
+        "candidates": [_candidate_record(one, light) for one in found],
     }
 
 
-def _candidate_record(one: Candidate) -> dict[str, Any]:
+def _candidate_record(one: Candidate, light: RigLight) -> dict[str, Any]:
     figures = {
         "focal_mm": one.focal_mm,
         "pixels_across": one.pixels_across,
         "f_number": one.f_number,
         "blur_px": one.total_px,
         "close_up_dpt": one.close_up_dpt,
-        "exposure_s": _exposure(one),
+        "exposure_s": light.exposure(one),
     }
     named = {"camera": one.camera.name, "lens": one.lens.name}
     return {**named, **_rounded(figures), "faults": list(one.faults)}
 
 
-def sheet_lines(needed: CameraRequirements, found: Sequence[Candidate]) -> list[str]:
+def sheet_lines(
+    needed: CameraRequirements, found: Sequence[Candidate], light: RigLight
+) -> list[str]:
     """The verdict, what to buy by, and the first candidates; lines of at most 80 columns."""
     good = [one for one in found if not one.faults]
     verdict = f"{len(good)} of {len(found)} cameras do with a lens of the list"
@@ -274,24 +216,22 @@ def sheet_lines(needed: CameraRequirements, found: Sequence[Candidate]) -> list[
         f"stop      entrance pupil {needed.pupil_mm:.2f} mm, F = focal length / "
         f"{needed.pupil_mm:.2f} mm:",
         f"          blur with diffraction {needed.total_px:.1f} pixels at both ends",
-        f"light     exposures below at {LUX:g} lx on the object, ISO {ISO:g}",
-        *(line for one in found[:SHOWN] for line in _candidate_lines(one)),
+        f"light     exposures below at {light.lux or LUX:.0f} lx on the object, ISO {ISO:g}"
+        + ("" if light.lux else " (no lamps)"),
+        f"mount     for {light.mounted or 'none of the list: a cylinder stands in for it'}",
+        *(line for one in found[:SHOWN] for line in _candidate_lines(one, light)),
     ]
 
 
-def _candidate_lines(one: Candidate) -> list[str]:
+def _candidate_lines(one: Candidate, light: RigLight) -> list[str]:
     figures = (
         f"  {one.focal_mm:.1f} mm, F/{one.f_number:.0f}, {one.pixels_across:.0f} pixels across, "
-        f"{_exposure(one):.2g} s"
+        f"{light.exposure(one):.2g} s"
     )
     if one.close_up_dpt:
         figures += f", close-up lens +{one.close_up_dpt:.1f} dpt"
     lines = [f"{one.camera.name} with {one.lens.name}"[:80], figures]
     return lines + [f"  does not do: {'; '.join(one.faults)}"[:80]] * bool(one.faults)
-
-
-def _exposure(one: Candidate) -> float:
-    return exposure_seconds(one.f_number, one.magnification, LUX, ISO)
 
 
 def _rounded(record: dict[str, float]) -> dict[str, float]:

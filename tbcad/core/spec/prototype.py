@@ -255,8 +255,22 @@ class FrameSpec(Section):
     """Play on the diameter of the bearings in their seats; below 0: a press fit."""
     belt_travel_mm: float = Field(6.0, ge=0, le=40)
     """Length by which the motor can be moved to tighten the belt, half to either side."""
-    camera_screw_mm: float = Field(50.0, ge=10, le=1000)
-    """Distance of the camera's tripod thread behind the pinhole."""
+    camera: str = AUTO
+    """Camera that mount, fence and lamp stands are made for: its name in the lists, with a lens by
+    "NAME with LENS"; none: a cylinder of camera_diameter_mm stands in for it; auto: the best that
+    does, whose sizes are known, and which has room in that cylinder."""
+    cameras: str = ""
+    """CSV list of further cameras, as of tbcad camera (as seen from the folder tbcad runs in)."""
+    lenses: str = ""
+    """CSV list of further lenses."""
+    camera_axis_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=5, le=300)
+    """Height of the optical axis over what the camera stands on; auto: as its list has it, or half
+    of camera_diameter_mm."""
+    camera_back_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=10, le=1000)
+    """Distance of the camera's back, and so of the fence, behind the pinhole; auto: by lens and
+    body, or camera_length_mm."""
+    camera_screw_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=10, le=1000)
+    """Distance of the camera's tripod thread behind the pinhole; auto: by lens and body, or 50."""
     camera_travel_mm: float = Field(20.0, ge=0, le=200)
     """Length by which the camera can be moved along its axis, half to either side."""
     post_play_mm: float = Field(0.2, ge=0, le=2)

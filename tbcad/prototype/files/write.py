@@ -22,6 +22,7 @@ from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.solids import pyramid, sphere
 from tbcad.common.schedule import Submit
+from tbcad.core.camera.sheet import write_camera_sheet
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
@@ -98,6 +99,8 @@ def export_prototype(
     sizes = {ball: "" for ball, cap in caps if not cap}
     steps = mounting_record(AssembledMachine(listed, record, (), sizes, built.parts))
     record.model_copy(update={"assembly_steps": steps}).write(folder / NAME)
+    radius = spec.optics.capture_diameter_mm / 2
+    write_camera_sheet(folder, design.arrays[0], radius, built.rig_light)
     return spec
 
 

@@ -21,15 +21,24 @@ from tbcad.core.geometry.primitives import (
     Prism,
     box,
     cylinder_between,
+    enclosing_triangles,
     rectangle,
     slot,
 )
 from tbcad.core.geometry.vectors import unit
+from tbcad.core.mirrors.array import MirrorArray
 from tbcad.core.optics.camera import Camera
+from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import PrototypeSpec
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.fasteners import Fastener
+from tbcad.prototype.frame.chosen_camera import (
+    ChosenCamera,
+    chosen_camera,
+    plate_face,
+    with_camera,
+)
 from tbcad.prototype.frame.shared import (
     CLEARANCE_HOLE_MM,
     OVERLAP_MM,
@@ -37,14 +46,14 @@ from tbcad.prototype.frame.shared import (
     level_prism,
     webs,
 )
-from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
+from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site, frame_axes
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.records.prototype import CameraTravel
 from tbcad.types import Floats
 
 M5_MM, M5_HOLE_MM = 5.0, CLEARANCE_HOLE_MM[5.0]
 TRIPOD_HOLE_MM = CLEARANCE_HOLE_MM[6.35]
-CAMERA_SCREW, NUT, WASHER, INSERT = "UNC1/4-20x12.7", "NUT-M5", "WASHER-5", "INSERT-M5"
+NUT, WASHER, INSERT = "NUT-M5", "WASHER-5", "INSERT-M5"
 NUT_MM, WASHER_MM = 4.7, 1.0
 
 # Travel to either side. Printed brackets are off by 0.5 mm and a degree; the rest is for cameras.
@@ -53,7 +62,10 @@ YAW_DEG, ROLL_DEG, PITCH_DEG = 3.0, 3.0, 2.0  # as far as the screws' play in th
 
 # The camera plate.
 TOP_MM = 12.0  # of plate and bracket behind the pinhole
-PLATE_MM, TRIPOD_MM = 12.0, 8.0  # thickness, and below the tripod screw's head
+PLATE_MM = 12.0  # thickness
+# The tripod screw: thread, least of the plate below its head, and in the camera (ISO 1222).
+TRIPOD_THREAD_MM, TRIPOD_MM, IN_CAMERA_MM = 6.35, 6.0, 4.7
+RISER_HALF_MM, RISER_END_MM = 15.0, 1.0  # half width, and from the lens's flange to its end
 HALF_PLATE_MM = 30.0
 GAP_MM = 14.0  # between plate and bracket: two nuts and a washer at the nearest
 UPPER_MM, LOWER_MM, PAIR_MM = 12.0, 72.0, 13.0  # of the three screws: from the top, half distance
@@ -64,6 +76,7 @@ WINDOW_WALL_MM = 2.0  # between window and the upper screws' slots
 PLATE_END_MM = 5.0  # of the plate beyond the fence's slots
 # The fence.
 FENCE_MM, FENCE_HEIGHT_MM, FENCE_HALF_MM = 12.0, 14.0, 28.0
+FENCE_LIP_MM = 6.0  # least height of the fence at the camera's back
 FENCE_SCREW_MM = 20.0  # from the middle to its screws
 HEAD_HOLE_MM, HEAD_DEPTH_MM = 9.0, 8.0  # counterbore
 
@@ -73,7 +86,8 @@ BRACKET_FOOT_MM = 70.0  # length of the foot beyond the bracket
 FOOT_BORDER_MM = 15.0  # of the foot beside the bracket: washers clear the webs by 1 mm
 WEB_SETBACK_MM = 4.0  # of webs from the ends of their flanges
 SLOT_SIDE_MM, SLOT_INNER_MM, SLOT_OUTER_MM = 9.0, 20.0, 14.0  # from the foot's edges to its slots
-REMEDY = "prototype.frame.camera_screw_mm larger or prototype.camera_diameter_mm smaller"
+REMEDY = "prototype.frame.camera another, or auto, or prototype.camera_diameter_mm smaller"
+SAME_MM = 1e-6
 AXIAL = 1e-6  # largest part of the camera's direction out of the frame's plane
 
 
@@ -82,6 +96,8 @@ class CameraMount(Mounted):
     """The bracket on the base plate, the camera's plate on three screws, and the fence on that."""
 
     travel: CameraTravel  # how far the camera moves to either side
+    chosen: ChosenCamera | None  # camera that it is made for; None: a cylinder stands in for it
+    riser: float  # between camera and camera plate, mm
 
 
 @dataclass(frozen=True)
@@ -92,6 +108,7 @@ class _Place:
     axes: Floats
     camera: Camera
     insert: PurchasedPart
+    chosen: ChosenCamera | None
 
     @cached_property
     def own(self) -> Floats:
@@ -101,9 +118,34 @@ class _Place:
         return np.stack([back, self.axes[1], unit(level - (level @ back) * back)])
 
     @property
+    def axis(self) -> float:
+        """Out to what the camera stands on."""
+        return float(self.spec.frame.camera_axis_mm)
+
+    @property
     def radius(self) -> float:
-        """Of the camera's body: its optical axis over the camera plate."""
-        return self.spec.camera_diameter_mm / 2
+        """Out to the camera plate; between this and the axis is a riser."""
+        return plate_face(self.axis, self.chosen.lens_radius) if self.chosen else self.axis
+
+    @property
+    def riser(self) -> float:
+        """Height of the riser; 0 without."""
+        return self.radius - self.axis
+
+    @property
+    def back(self) -> float:
+        """Behind the pinhole to the camera's back."""
+        return float(self.spec.frame.camera_back_mm)
+
+    @property
+    def tripod(self) -> float:
+        """Behind the pinhole to the tripod thread."""
+        return float(self.spec.frame.camera_screw_mm)
+
+    @property
+    def fence_height(self) -> float:
+        """From the camera plate to the fence's edge."""
+        return max(FENCE_HEIGHT_MM, self.riser + FENCE_LIP_MM)
 
     @property
     def bracket_at(self) -> float:
@@ -118,7 +160,7 @@ class _Place:
     @property
     def fence_screws(self) -> float:
         """Behind the pinhole to the fence's screws."""
-        return self.spec.camera_length_mm + FENCE_MM / 2
+        return self.back + FENCE_MM / 2
 
     @property
     def fence_travel(self) -> float:
@@ -146,7 +188,7 @@ class _Place:
     def screws(self) -> Floats:
         """Places (3, 2) of the three screws: behind the pinhole, and across."""
         upper = TOP_MM + UPPER_MM
-        beyond = self.spec.frame.camera_screw_mm + self.recess + self.insert["outer_mm"]
+        beyond = self.tripod + self.recess + self.insert["outer_mm"]
         lower = max(TOP_MM + LOWER_MM, beyond)
         return np.array([[upper, -PAIR_MM], [upper, PAIR_MM], [lower, 0.0]])
 
@@ -174,22 +216,21 @@ class _Place:
 
 
 def camera_mount(site: Site, _: FrameLayout) -> CameraMount | None:
-    """Bracket, plate and fence for a camera, and its body; None without a camera.
+    """Bracket, plate and fence for a camera, and its bodies; None without a camera.
 
-    SpecError when the camera does not look along the frame's plane, its thread lies beyond its end,
-    or camera or mount reach the base plate.
+    SpecError when there is no such camera, it does not look along the frame's plane, its thread
+    lies beyond its end, or camera or mount reach the base plate.
     """
-    spec, camera, parts = site.spec.prototype, site.layout.array.camera, site.parts
-    if not spec.camera_diameter_mm:
+    array, parts = site.layout.array, site.parts
+    place = _checked_place(site.spec, array, site.axes, parts)
+    if place is None:
         return None
-    place = _Place(spec, site.axes, camera, parts[INSERT])
-    _check_camera(place)
-    body = Cylinder(camera.pinhole, -camera.forward, place.radius, spec.camera_length_mm)
+    spec = place.spec
     play = float(np.degrees(np.arctan((M5_HOLE_MM - M5_MM) / spec.frame.flange_mm)))
     return CameraMount(
         brackets=(_bracket(place),),
-        printed=(_plate(place), _fence(place)),
-        purchased=(Component("camera", "camera behind its pinhole", (body,)),),
+        printed=(_plate(place, parts), *_riser(place), _fence(place)),
+        purchased=_camera(place),
         fasteners=_fasteners(place, parts),
         travel=CameraTravel(
             along_axis_mm=place.along,
@@ -200,6 +241,39 @@ def camera_mount(site: Site, _: FrameLayout) -> CameraMount | None:
             roll_deg=min(ROLL_DEG, play),
             pitch_deg=min(PITCH_DEG, play),
         ),
+        chosen=place.chosen,
+        riser=place.riser,
+    )
+
+
+def check_camera(spec: Spec, array: MirrorArray, parts: Parts) -> None:
+    """Refuse a camera that no arrangement of balls has room for; SpecError as of `camera_mount`."""
+    _checked_place(spec, array, frame_axes(unit(array.camera.pinhole)), parts)
+
+
+def _checked_place(spec: Spec, array: MirrorArray, axes: Floats, parts: Parts) -> _Place | None:
+    if not spec.prototype.camera_diameter_mm:
+        return None
+    keys, chosen = with_camera(spec, array).prototype, chosen_camera(spec, array)
+    place = _Place(keys, axes, array.camera, parts[INSERT], chosen)
+    _check_camera(place, _camera(place))
+    return place
+
+
+def _camera(place: _Place) -> tuple[Component, ...]:
+    """The camera's outline and its lens, or a cylinder in their place."""
+    camera, chosen = place.camera, place.chosen
+    if chosen is None:
+        stand_in = Cylinder(camera.pinhole, -camera.forward, place.axis, place.back)
+        return (Component("camera", "camera behind its pinhole", (stand_in,)),)
+    body, lens, wide = chosen.best.camera, chosen.best.lens, chosen.half_width
+    top = place.axis - (body.body_height_mm or 0.0)
+    outline = place.block((chosen.flange, -wide, top), (chosen.back, wide, place.axis))
+    start, end = (place.point(back, 0.0, 0.0) for back in (chosen.front, chosen.flange))
+    barrel = cylinder_between(start, end, chosen.lens_radius)
+    return (
+        Component("camera", body.name, (outline,)),
+        Component("camera_lens", lens.name, (barrel,)),
     )
 
 
@@ -209,9 +283,18 @@ def _fasteners(place: _Place, parts: Parts) -> tuple[Fastener, ...]:
         *(_tilting_screw(place, back, across, parts) for back, across in place.screws.tolist()),
         *(_fence_screw(place, side * FENCE_SCREW_MM, parts) for side in (-1, 1)),
     ]
-    at = place.point(place.spec.frame.camera_screw_mm, 0.0, place.radius + TRIPOD_MM)
-    tripod = Fastener(parts[CAMERA_SCREW], at, -place.own[2], ("camera_plate", "camera"))
+    screw, below = _tripod_screw(place, parts)
+    at = place.point(place.tripod, 0.0, place.radius + below)
+    through = ("camera_plate", *(one.name for one in _riser(place)), "camera")
+    tripod = Fastener(screw, at, -place.own[2], through)
     return (*(one for some in screws for one in some), tripod)
+
+
+def _tripod_screw(place: _Place, parts: Parts) -> tuple[PurchasedPart, float]:
+    """The tripod screw, and what its head leaves of the plate."""
+    length = TRIPOD_MM + place.riser + IN_CAMERA_MM
+    screw = choose_screw(parts, TRIPOD_THREAD_MM, length)
+    return screw, screw["length_mm"] - place.riser - IN_CAMERA_MM
 
 
 def _tilting_screw(place: _Place, back: float, across: float, parts: Parts) -> tuple[Fastener, ...]:
@@ -238,8 +321,8 @@ def _tilting_screw(place: _Place, back: float, across: float, parts: Parts) -> t
 def _fence_screw(place: _Place, across: float, parts: Parts) -> tuple[Fastener, ...]:
     """A screw from the fence through the plate into a nut on a washer."""
     out, plate = place.own[2], ("camera_plate",)
-    length = FENCE_HEIGHT_MM - HEAD_DEPTH_MM + PLATE_MM + WASHER_MM + NUT_MM
-    head, face = place.radius - FENCE_HEIGHT_MM + HEAD_DEPTH_MM, place.radius + PLATE_MM
+    length = place.fence_height - HEAD_DEPTH_MM + PLATE_MM + WASHER_MM + NUT_MM
+    head, face = place.radius - place.fence_height + HEAD_DEPTH_MM, place.radius + PLATE_MM
 
     def at(away: float) -> Floats:
         return place.point(place.fence_screws, across, away)
@@ -251,11 +334,11 @@ def _fence_screw(place: _Place, across: float, parts: Parts) -> tuple[Fastener, 
     )
 
 
-def _plate(place: _Place) -> Component:
+def _plate(place: _Place, parts: Parts) -> Component:
     """The plate that carries the camera: inserts for three screws, slots for tripod and fence."""
     near, far = place.radius, place.radius + PLATE_MM
     through = (near - THROUGH_MM, far + THROUGH_MM)
-    screw, recess = place.spec.frame.camera_screw_mm, place.recess
+    screw, recess, (_, below) = place.tripod, place.recess, _tripod_screw(place, parts)
     tripod = place.point(screw, 0.0, through[0])
     depth = (through[1] - through[0]) * place.own[2]
     removed: list[Primitive] = [
@@ -265,7 +348,7 @@ def _plate(place: _Place) -> Component:
     removed.append(slot(tripod, place.own[0], 2 * place.along, TRIPOD_HOLE_MM / 2, depth))
     removed.append(
         place.block(
-            (screw - recess, -RECESS_MM, near + TRIPOD_MM), (screw + recess, RECESS_MM, through[1])
+            (screw - recess, -RECESS_MM, near + below), (screw + recess, RECESS_MM, through[1])
         )
     )
     for across in (-FENCE_SCREW_MM, FENCE_SCREW_MM):
@@ -277,10 +360,22 @@ def _plate(place: _Place) -> Component:
     return Component("camera_plate", what, (body,), tuple(removed), (-out, out))
 
 
+def _riser(place: _Place) -> tuple[Component, ...]:
+    """The block between plate and camera that keeps the lens off the plate, where it needs one."""
+    if place.chosen is None or not place.riser:
+        return ()
+    start, half = place.chosen.flange + RISER_END_MM, max(RISER_HALF_MM, place.chosen.half_width)
+    body = place.block((start, -half, place.axis), (place.back, half, place.radius))
+    ends = place.axis - THROUGH_MM, place.radius + THROUGH_MM
+    hole = place.hole(place.tripod, 0.0, ends, TRIPOD_HOLE_MM)
+    out, what = place.own[2], "riser between plate and camera"
+    return (Component("camera_riser", what, (body,), (hole,), (out, -out)),)
+
+
 def _fence(place: _Place) -> Component:
     """The bar below the camera that its back lies against."""
-    near, far = place.radius - FENCE_HEIGHT_MM, place.radius
-    start = place.spec.camera_length_mm
+    near, far = place.radius - place.fence_height, place.radius
+    start = place.back
     body = place.block((start, -FENCE_HALF_MM, near), (start + FENCE_MM, FENCE_HALF_MM, far))
     removed = []
     for across in (-FENCE_SCREW_MM, FENCE_SCREW_MM):
@@ -324,7 +419,7 @@ def _bracket(place: _Place) -> Bracket:
     through, out = (near - THROUGH_MM, far + THROUGH_MM), place.own[2]
     depth = (frame.flange_mm + 2 * THROUGH_MM) * axes[2]
     starts = [np.array([*hole, low - THROUGH_MM]) @ axes for hole in holes]
-    key, window = frame.camera_screw_mm, place.window
+    key, window = place.tripod, place.window
     removed = (
         *(place.slot((x, y), 1, ACROSS_MM, through) for x, y in place.screws.tolist()),
         # Through a window the tripod screw is turned.
@@ -341,28 +436,33 @@ def _bracket(place: _Place) -> Bracket:
     return Bracket(component, holes, np.array([[first, -half], [end, half]]))
 
 
-def _check_camera(place: _Place) -> None:
-    frame, along = place.spec.frame, place.along
-    length = place.spec.camera_length_mm
+def _check_camera(place: _Place, bodies: tuple[Component, ...]) -> None:
+    frame, along, chosen = place.spec.frame, place.along, place.chosen
     if abs(float(place.camera.forward @ place.axes[1])) > AXIAL:
         raise SpecError(
             "the camera does not look along the plane of the frame, so there is no bracket for it: "
             "set the second number of optics.camera_mm to 0, or prototype.camera_diameter_mm to 0"
         )
     nearest = place.screws[0, 0] + M5_HOLE_MM / 2 + WINDOW_WALL_MM + place.window
-    if frame.camera_screw_mm < nearest:
+    if place.tripod < nearest:
         raise SpecError(
-            f"prototype.frame.camera_screw_mm {frame.camera_screw_mm:g} is too near to the "
+            f"prototype.frame.camera_screw_mm {place.tripod:g} is too near to the "
             f"pinhole: make it {np.ceil(nearest):g} or more, or camera_travel_mm smaller"
         )
-    if frame.camera_screw_mm > length:
+    if place.tripod > place.back:
         raise SpecError(
-            f"prototype.frame.camera_screw_mm {frame.camera_screw_mm:g} lies beyond the camera's "
-            f"end: make it less than prototype.camera_length_mm {length:g}"
+            f"prototype.frame.camera_screw_mm {place.tripod:g} lies beyond the camera's "
+            f"end: make it less than {place.back:g}, where prototype.frame.camera_back_mm has it"
         )
-    ends = [place.point(length + along, 0.0, -place.radius)]
-    ends += [place.point(place.plate_end, 0.0, out) for out in (place.radius, place.bracket_at)]
-    lowest = float(min(end[2] for end in ends))
+    if chosen and place.back < chosen.back - SAME_MM:
+        raise SpecError(
+            f"the fence would stand in the camera, whose back is {chosen.back:g} mm behind the "
+            "pinhole: set prototype.frame.camera_back_mm to that, or to auto"
+        )
+    ends = [place.point(place.plate_end, 0.0, out) for out in (place.radius, place.bracket_at)]
+    points = [enclosing_triangles(one).reshape(-1, 3) for body in bodies for one in body.added]
+    lowest = float((np.vstack(points) + along * place.own[0])[:, 2].min())
+    lowest = min(lowest, *(float(end[2]) for end in ends))
     if lowest < frame.floor_mm:
         raise SpecError(
             f"the camera reaches down to {lowest:.0f} mm, below the base plate: make "
@@ -372,10 +472,12 @@ def _check_camera(place: _Place) -> None:
 
 @planned(
     "Bracket, plate and fence of the camera",
-    *("camera_bracket", "camera_plate", "camera_fence", "camera"),
+    *("camera_bracket", "camera_plate", "camera_riser", "camera_fence", "camera", "camera_lens"),
 )
 def camera_step(machine: AssembledMachine) -> Words:
     """The camera's mount."""
+    made_for = machine.has("camera_lens")
+    riser = " on the riser" if machine.has("camera_riser") else ""
     does = [
         "Press the inserts into the camera plate from behind.",
         "Bracket on the base plate with washers, in the middle of its slots.",
@@ -384,9 +486,10 @@ def camera_step(machine: AssembledMachine) -> Words:
         f"{GAP_MM:g} mm between plate and bracket. The nut at the plate locks the screw, the other "
         "one clamps the bracket.",
         "Camera and lens are not in the list: camera.json has what they must do, and tbcad camera "
-        "shows which on sale do it.",
-        "Fence on the plate. Then your camera on the plate by its tripod thread, its back against "
-        "the fence.",
+        "shows which on sale do it."
+        + when(made_for, " The mount is made for the camera and the lens that the picture names."),
+        f"Fence on the plate. Then your camera{riser} on the plate by its tripod thread, its back "
+        "against the fence.",
     ]
     checks = [
         f"The gap between plate and bracket is {GAP_MM:g} mm at all three screws, to 0.5 mm.",

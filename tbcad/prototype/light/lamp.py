@@ -32,6 +32,7 @@ COLUMN_MM = 14.0  # depth of a stand's column behind its holder's face
 COLUMN_OUT_MM = 6.0  # by which columns stand farther out than upright lamps, away from the camera
 # A stand's foot, from the column's middle: to either side along x, inward and outward along y, and
 # to its two screws.
+OFF_CAMERA_MM = 3.0  # from columns and feet to the camera
 FOOT_HALF_MM, FOOT_IN_MM, FOOT_OUT_MM = 18.0, 10.0, 34.0
 SCREW_SIDE_MM, SCREW_OUT_MM = 10.0, 25.0
 OUT_MM = 12.0  # by which upright lamps are farther out than the uprights' middles
@@ -55,6 +56,7 @@ class LampLayout(Mounted):
     inward: Floats  # unit directions that they shine in, (l, 3)
     # heights (z) of the holders' screws on each upright, the upper first, mm
     screws: tuple[float, ...]
+    column: float  # y of the middles of the stands' columns, at either side, mm
 
     @property
     def width(self) -> float:
@@ -85,6 +87,14 @@ class LampLayout(Mounted):
     def lumen(self) -> float:
         """Light of one lamp."""
         return self.strips * self.length / 1e3 * self.strip["lumen_m"]
+
+    @property
+    def lux(self) -> float:
+        """Light on upright surfaces in the middle, the mean over azimuths, no shadows cast."""
+        away = norm(self.places)
+        leaves = -np.sum(self.places * self.inward, axis=1) / away
+        across = norm(self.places[:, :2]) / away / np.pi  # mean of a cosine that is not below 0
+        return float((1e6 * self.lumen / np.pi * leaves * across / away**2).sum())
 
     def outlines(self) -> Floats:
         """Corners of all shining faces and the middles of their upright edges, mm, (l, 6, 3)."""
@@ -158,6 +168,7 @@ class Lamps:
     face: float  # x of the uprights' front, mm
     strip: PurchasedPart  # part
     aside: float | None  # y of level lamps, mm; None: they are upright
+    camera: float = 0.0  # half width of the camera, which columns stand beside
 
     @property
     def level(self) -> bool:
@@ -193,7 +204,13 @@ class Lamps:
     @property
     def column(self) -> float:
         """Y of the columns' middles, at either side."""
-        return self.across + OUT_MM + COLUMN_OUT_MM
+        return self.across + OUT_MM + COLUMN_OUT_MM + self.aside_camera
+
+    @property
+    def aside_camera(self) -> float:
+        """How much farther out columns are for a wide camera."""
+        usual = self.across + OUT_MM + COLUMN_OUT_MM
+        return max(self.camera + FOOT_IN_MM + OFF_CAMERA_MM - usual, 0.0)
 
     def screws(self, place: Floats) -> list[Floats]:
         """Places of a holder's screws on the uprights' faces, the upper first."""
@@ -220,7 +237,7 @@ class Lamps:
         if not self.level:
             side, end = float(np.sign(place[1])), abs(float(place[1]))
             what, sides = f"stand of lamp {number}", [side]
-            y = np.sort(side * np.array([end - self.half, end + self.half]))
+            y = np.sort(side * np.array([end - self.half, end + self.half + self.aside_camera]))
         x = float(place[0]) + self.strip["thickness_mm"] + COLUMN_MM / 2
         floor, flange = self.spec.frame.floor_mm, self.spec.frame.flange_mm
         feet, holes, added = list[Floats](), list[Floats](), list[Primitive]()
@@ -290,6 +307,7 @@ class Lamps:
             places=places,
             inward=-np.sign(places[:, :1]) * LEVEL,
             screws=tuple(dict.fromkeys(float(at[2]) for at in self.screws(behind[0][1]))),
+            column=self.column,
         )
 
     def _heights(self, place: Floats, below: float) -> tuple[float, float]:

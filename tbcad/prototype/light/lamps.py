@@ -28,6 +28,7 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.section import AUTO
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
 from tbcad.prototype.files.bom import PartsList
+from tbcad.prototype.frame.camera_mount import CameraMount
 from tbcad.prototype.frame.shared import EXTRUSION_MM, BearingHead
 from tbcad.prototype.keepout import min_distance
 from tbcad.prototype.light.lamp import (
@@ -66,9 +67,12 @@ def lamp_layout(site: Site, before: FrameLayout) -> LampLayout | None:
     """
     spec, face = site.spec.prototype, before.of(BearingHead).face
     strip, short = site.parts[STRIP], site.parts[SHORT_STRIP]
+    mount = before.find(CameraMount)
+    wide = mount.chosen.half_width if mount and mount.chosen else 0.0
     tries = (strip, None), *product((strip, short), ASIDE_MM)
-    found = [Lamps(spec, site.parts, face, *one) for one in tries]
-    search = _LampSearch(site, (*before.printed, *before.purchased))
+    found = [Lamps(spec, site.parts, face, *one, wide) for one in tries]
+    camera = mount.purchased if mount and wide else ()
+    search = _LampSearch(site, (*before.printed, *before.purchased), camera)
     section = spec.light
     if (current := found[0].layout(-1.0).current_ma) > MAX_MA:
         raise SpecError(
@@ -96,6 +100,7 @@ class _LampSearch:
 
     site: Site
     beside: tuple[Component, ...]
+    camera: tuple[Component, ...]  # bodies of a camera that is known
 
     def highest(self, lamps: Lamps) -> float | None:
         """The greatest height at which lamps have room, or None."""
@@ -119,7 +124,7 @@ class _LampSearch:
         bodies = _bodies(layout)
         if in_view(bodies, self.site.layout.array.camera):
             return "the camera sees a lamp or its stand"
-        if lamps.level and (name := _met(bodies, self.beside)):
+        if name := _met(bodies, self.beside if lamps.level else self.camera):
             return f"a lamp or its holder meets the {name.replace('_', ' ')}"
         for what, distance in (
             ("the light of the balls", keep_out.to_light),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tbcad.core.camera.sheet import CAMERA_COLUMNS
+from tbcad.core.camera.lists import CAMERA_COLUMNS, LENS_COLUMNS
 from tbcad.prototype.files.bom import COLUMNS
 from tbcad.prototype.purchased.parts import PRICE_FIELDS as PRICE_FILE
 from tests.app.cli.commands import Command
@@ -81,10 +81,46 @@ def test_lines_of_the_sheet(cli: Command) -> None:
 
 def test_a_users_camera_is_a_candidate(tmp_path: Path, cli: Command) -> None:
     file = tmp_path / "mine.csv"
-    file.write_text(",".join(CAMERA_COLUMNS) + "\nMine,Sony E,36,24,30000,20000,usb,me\n")
+    file.write_text(",".join(CAMERA_COLUMNS) + "\nMine,Sony E,36,24,30000,20000,usb,,,,,,,,me\n")
     record = json.loads(cli("camera", "--n", "6", "--cameras", file, "--json").out)
     assert record["candidates"][0]["camera"] == "Mine"
     assert record["requirements"]["near_mm"] < record["requirements"]["far_mm"]
+
+
+def test_a_camera_to_use_is_tried_with_all_bodies(tmp_path: Path, cli: Command) -> None:
+    """A lens of one's own suits n = 6; light is that of the prototype's lamps."""
+    file = tmp_path / "lenses.csv"
+    file.write_text(",".join(LENS_COLUMNS) + "\nmine,C,6,6,1.8,16,0.17,20,54,57,215,me\n")
+    name = "FLIR Blackfly S BFS-U3-244S8C (IMX540)"
+    words = ["camera", "--n", "6", "--lenses", file, "--use", name]
+    first, axis, *_, design = cli(*words).out.splitlines()
+    assert first == f"{name} with mine fits"
+    assert "22.5 mm over what the camera stands on, a riser of 7.5 mm" in axis
+    assert design.endswith(f'prototype.frame.camera = "{name} with mine"')
+    record = json.loads(cli(*words, "--json").out)
+    assert record["exposure"]["illuminance_lux"] == pytest.approx(1000, rel=0.05)
+    assert record["sets"]["camera_back_mm"] == pytest.approx(78.9)
+    found = next(one for one in record["candidates"] if one["camera"] == name)
+    assert record["sets"]["exposure_s"] == pytest.approx(found["exposure_s"], abs=1e-3)
+    assert record["mounted"] == f"{name} with mine"
+
+
+def test_a_camera_that_does_not_fit_is_refused_with_one_that_does(
+    tmp_path: Path, cli: Command
+) -> None:
+    file, bodies = tmp_path / "lenses.csv", tmp_path / "cameras.csv"
+    file.write_text(",".join(LENS_COLUMNS) + "\nmine,C,6,6,1.8,16,0.17,20,54,57,215,me\n")
+    tall = "tall,C,14.58,12.6,5320,4600,usb,wire,29,300,39,22.5,15,53,me"
+    bodies.write_text(",".join(CAMERA_COLUMNS) + f"\n{tall}\n")
+    own = ["camera", "--n", "6", "--set", "prototype.k=4", "--lenses", file]
+    for name, fault in (
+        ("Raspberry Pi High Quality Camera (IMX477)", "shows "),
+        ("Canon EOS R5", "not known"),
+        ("tall", "reaches down to"),
+    ):
+        error = refused(cli, *own, "--cameras", bodies, "--use", name)
+        assert fault in error
+        assert "FLIR Blackfly S BFS-U3-244S8C (IMX540) with mine" in error
 
 
 def test_a_sensor_that_no_camera_has(cli: Command) -> None:

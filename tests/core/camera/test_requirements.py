@@ -7,6 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tbcad.core.camera.lists import (
+    CAMERA_COLUMNS,
+    LENS_COLUMNS,
+    CameraBody,
+    RectilinearLens,
+    load_cameras,
+    load_lenses,
+)
 from tbcad.core.camera.requirements import (
     CameraRequirements,
     DepthRange,
@@ -21,16 +29,7 @@ from tbcad.core.camera.requirements import (
     lens_for,
     sharpest,
 )
-from tbcad.core.camera.sheet import (
-    CAMERA_COLUMNS,
-    LENS_COLUMNS,
-    CameraBody,
-    RectilinearLens,
-    best_lenses,
-    candidates,
-    load_cameras,
-    load_lenses,
-)
+from tbcad.core.camera.sheet import best_lenses, candidates
 from tbcad.core.mirrors.array import MirrorArray
 from tbcad.errors import InputError
 from tbcad.types import Floats
@@ -240,11 +239,12 @@ def test_built_in_lists_are_sound() -> None:
 @pytest.mark.parametrize(
     ("table", "text", "message"),
     [
-        ("cameras", "x,M,36,24,6000,4000,gphoto2,", "line 2, column source: empty"),
-        ("cameras", "x,M,0,24,6000,4000,gphoto2,s", "column sensor_width_mm: '0', allowed is a"),
-        ("cameras", "Canon EOS R5,M,36,24,6000,4000,g,s", "column name: 'Canon EOS R5' twice"),
-        ("lenses", "x,M,20,15,2.8,22,0.2,43,s", "column focal_max_mm: 15, allowed is 20 or more"),
-        ("lenses", "x,M,20", "3 columns, not 9"),
+        ("cameras", "x,M,36,24,60,40,g,,,,,,,,", "line 2, column source: empty"),
+        ("cameras", "x,M,0,24,60,40,g,,,,,,,,s", "column sensor_width_mm: '0', allowed is a"),
+        ("cameras", "x,M,36,24,60,40,g,,90,-1,,,,,s", "column body_height_mm: '-1', allowed"),
+        ("cameras", "Canon EOS R5,M,36,24,60,40,g,,,,,,,,s", "column name: 'Canon EOS R5' twice"),
+        ("lenses", "x,M,20,15,2.8,22,0.2,43,,,,s", "column focal_max_mm: 15, allowed is 20 or"),
+        ("lenses", "x,M,20", "3 columns, not 12"),
     ],
 )
 def test_users_lists_are_refused_by_line(

@@ -10,6 +10,7 @@ import pytest
 
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import StageSpec
+from tbcad.light.simulate.scene.lamps import RectangularLamps, irradiance
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.frame.shared import BearingHead
 from tbcad.prototype.keepout import KeepOut
@@ -45,6 +46,16 @@ def test_lamps_are_images_of_one_another_that_the_camera_does_not_see(
     x, y, depth = ((corners - camera.pinhole) @ camera.axes.T).T
     half = camera.half_sizes
     assert not ((np.abs(x) < half[0] * depth) & (np.abs(y) < half[1] * depth)).any()
+
+
+def test_light_of_the_lamps_is_that_on_upright_surfaces(frame: FrameLayout) -> None:
+    """As summed over tiles and directions; the paper's design has 1025 lx over the whole room."""
+    lamps = frame.find(LampLayout)
+    assert lamps
+    tiled = RectangularLamps(lamps.places, lamps.inward, *lamps.sides, lamps.lumen)
+    angle = np.linspace(0, 2 * np.pi, 73)[:-1]
+    normals = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    assert lamps.lux == pytest.approx(irradiance(tiled, 0 * normals, normals).mean(), rel=0.02)
 
 
 def test_higher_lamps_have_no_room(site: Site, frame: FrameLayout) -> None:

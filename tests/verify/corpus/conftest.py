@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tbcad.app.cli import run
+from tbcad.core.camera.lists import LENS_COLUMNS
 from tests.verify.corpus.copies import digests
 from tests.verify.corpus.readings import remembered
 
@@ -51,7 +52,10 @@ def built(folder: Path, settings: Sequence[str], *words: str) -> Iterator[Path]:
 def good_prototype(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A small prototype as `tbcad build` writes it; tests break copies of it only."""
     folder = tmp_path_factory.mktemp("corpus") / "prototype"
-    with built(folder, PROTOTYPE_SETTINGS, "--parts", "prototype", "--no-verify"):
+    lenses = folder.parent / "lenses.csv"  # a lens wide enough for a camera of the list
+    lenses.write_text(f"{','.join(LENS_COLUMNS)}\nwide,C,6,6,1.8,16,0.174,20,54,57,215,test\n")
+    settings = (*PROTOTYPE_SETTINGS, f"prototype.frame.lenses={lenses}")
+    with built(folder, settings, "--parts", "prototype", "--no-verify"):
         yield folder
 
 

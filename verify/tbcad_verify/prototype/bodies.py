@@ -23,7 +23,7 @@ from tbcad_verify.prototype.seats import MeasuredSeat
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Bools, Floats, Ints
 
-OWN = ("camera",)  # body that its own rays start in
+OWN = ("camera", "camera_lens")  # bodies that its own rays start in
 SWUNG, STILL = ("base", "cap"), ("stage", "frame")  # roles of parts that turn with the base or not
 LEAST_ANGLES = 7
 LIFT_MM = 1e-3

@@ -59,13 +59,12 @@ def _faults(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Itera
     near = (bracket.corners - context.pinhole) @ axes[2]
     outs = (plate.corners - context.pinhole) @ axes[2]
     face, back = float(outs.min()), float(outs.max())
-    if abs(face - spec.camera_diameter_mm / 2) > SAME_MM:
-        yield f"the camera plate is {face:.3f} mm from the optical axis"
+    yield from _camera_faults(context, solids, face)
     gap = float(near[near > back - SAME_MM].min()) - back
     # As far as there is room for the nuts, and as the screws are long.
     beyond = _longest_m5(context) - WASHER_MM - spec.frame.flange_mm - gap - GRIP_MM
     travel["out_mm"] = min(gap - TWO_NUTS_MM, beyond)
-    yield from _fence_faults(context, fence, along)
+    yield from _fence_faults(context, fence, face)
     held = _places(context, fence, M5_HOLE_MM, 2)
     reach = _least_reach(held, _places(context, plate, M5_HOLE_MM, 2), 0)
     lever = float(np.abs(held[:, 1]).max(initial=SAME_MM))
@@ -125,17 +124,34 @@ def _foot_travel(context: PrototypeContext, bracket: TextSolid) -> float:
     return float(min(travel, default=0.0))
 
 
-def _fence_faults(context: PrototypeContext, fence: TextSolid, along: float) -> Iterator[str]:
+def _camera_faults(
+    context: PrototypeContext, solids: Mapping[str, TextSolid], face: float
+) -> Iterator[str]:
+    """The camera stands on its plate, whose face is so far out, or on a riser between both."""
+    frame, axes = context.export.spec.prototype.frame, _axes(context)
+    stands = frame.camera_axis_mm
+    riser, camera = solids.get("camera_riser"), solids.get("camera")
+    heights = (riser.corners - context.pinhole) @ axes[2] if riser else np.array([face])
+    if abs(heights.min() - stands) > SAME_MM or abs(heights.max() - face) > SAME_MM:
+        yield f"the camera plate is {face:.3f} mm from the optical axis, without a riser that fits"
+    if camera and "camera_lens" in solids:  # else a cylinder stands in for it
+        ends = ((camera.corners - context.pinhole) @ axes.T).max(axis=0)
+        if abs(ends[2] - stands) > SAME_MM:
+            yield f"the camera stands {ends[2]:.2f} mm from its axis"
+        if abs(ends[0] - frame.camera_back_mm) > SAME_MM:
+            yield f"the camera's back is {ends[0]:.2f} mm behind the pinhole"
+
+
+def _fence_faults(context: PrototypeContext, fence: TextSolid, face: float) -> Iterator[str]:
     """The fence lies on the plate, at the camera's back, high and wide enough to hold it."""
     spec = context.export.spec.prototype
     corners = (fence.corners - context.pinhole) @ _axes(context).T
     low, high = corners.min(axis=0), corners.max(axis=0)
-    radius = spec.camera_diameter_mm / 2
-    if abs(low[0] - spec.camera_length_mm) > SAME_MM:
+    if abs(low[0] - spec.frame.camera_back_mm) > SAME_MM:
         yield f"the fence is {low[0]:.2f} mm behind the pinhole"
-    if abs(high[2] - radius) > SAME_MM:
+    if abs(high[2] - face) > SAME_MM:
         yield "the fence does not lie on the camera plate"
-    if radius - low[2] < LIP_MM or high[1] - low[1] < LIP_WIDTH_MM:
+    if spec.frame.camera_axis_mm - low[2] < LIP_MM or high[1] - low[1] < LIP_WIDTH_MM:
         yield "the fence does not keep the camera from turning"
 
 

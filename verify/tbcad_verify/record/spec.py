@@ -171,7 +171,9 @@ class FrameSpec(Strict):
     flange_mm: float = Field(ge=3, le=30)
     bearing_fit_mm: float = Field(ge=-0.5, le=0.5)
     post_play_mm: float = Field(ge=0, le=2)
-    camera_screw_mm: float = Field(ge=10, le=1000)
+    camera_axis_mm: Annotated[float, Field(ge=5, le=300), OR_AUTO]
+    camera_back_mm: Annotated[float, Field(ge=10, le=1000), OR_AUTO]
+    camera_screw_mm: Annotated[float, Field(ge=10, le=1000), OR_AUTO]
     camera_travel_mm: float = Field(ge=0, le=200)
 
 
@@ -185,7 +187,6 @@ class PrototypeSpec(Strict):
     ball_wall_mm: Annotated[float, Field(ge=0, le=50), OR_AUTO]
     largest_ball_mm: Annotated[float, Field(gt=0, le=1000), OR_AUTO]
     camera_diameter_mm: Annotated[float, Field(ge=0, le=500), OR_AUTO]
-    camera_length_mm: float = Field(ge=0, le=1000)
     base: BaseSpec
     motion: MotionSpec
     stage: StageSpec

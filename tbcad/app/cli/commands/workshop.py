@@ -27,27 +27,41 @@ def camera(
     settings: Settings = None,
     cameras: CamerasOption = None,
     lenses: LensesOption = None,
+    use: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Camera of the lists that the prototype is made for."),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the sheet as JSON.")] = False,
 ) -> int:
     """Say which sensor, lens, stop and focus a design needs, and which cameras on sale have them.
 
-    Exit code 0: some camera of the lists does. 1: none does. 2: bad input.
+    With --use NAME: what that camera sets in the prototype, tried with all of its bodies; what does
+    not fit is refused, with one that does. Exit code 0: some camera of the lists does. 1: none
+    does. 2: bad input, or NAME does not fit.
     """
-    from tbcad.core.camera.sheet import load_cameras, load_lenses
     from tbcad.core.spec.load import load_spec
 
+    given = {"camera": use, "cameras": cameras, "lenses": lenses}
     options = list(settings or []) + ([f"optics.n={n}"] if n is not None else [])
+    options += [
+        f"prototype.frame.{key}={value}" for key, value in given.items() if value is not None
+    ]
     spec = load_spec(design, options)
-    listed = load_cameras(cameras), load_lenses(lenses)
 
     from tbcad.app.api import design as mirror_design
+    from tbcad.core.camera.lists import load_cameras, load_lenses
     from tbcad.core.camera.requirements import camera_requirements
     from tbcad.core.camera.sheet import best_lenses, sheet_lines, sheet_record
+    from tbcad.prototype.camera_fit import fit_camera
 
-    array = mirror_design(spec).arrays[0]
-    needed = camera_requirements(array, spec.optics.capture_diameter_mm / 2)
+    listed = load_cameras(cameras), load_lenses(lenses)
+    mirrors = mirror_design(spec)
+    needed = camera_requirements(mirrors.arrays[0], spec.optics.capture_diameter_mm / 2)
     best = best_lenses(needed, *listed)
-    print_result(sheet_record(needed, best), sheet_lines(needed, best), json)
+    fitted = fit_camera(mirrors)
+    record = sheet_record(needed, best, fitted.light)
+    lines = fitted.lines if use else sheet_lines(needed, best, fitted.light)
+    print_result(record | {"sets": fitted.sets}, lines, json)
     return 0 if any(not one.faults for one in best) else 1
 
 
