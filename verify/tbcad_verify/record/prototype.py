@@ -31,6 +31,7 @@ from tbcad_verify.record.prototype_sections import (
     PlateHoles,
     PrintedPart,
     PurchasedBody,
+    SagTable,
     Seat,
     Shroud,
     Stops,
@@ -45,11 +46,11 @@ from tbcad_verify.record.validation import (
 
 SCHEMA = "tbcad-prototype/2"
 RECORD, GLB = "prototype.json", "prototype.glb"
-PLATE_HOLES = "plate_holes.csv"
+PLATE_HOLES, SAG = "plate_holes.csv", "sag.csv"
 BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"
 SETTINGS = "grbl_settings.txt"
 KLIPPER, KLIPPER_CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"
-OPTIONAL = (PLATE_HOLES, KLIPPER, KLIPPER_CONFIG)
+OPTIONAL = (PLATE_HOLES, SAG, KLIPPER, KLIPPER_CONFIG)
 
 
 class Prototype(Strict):
@@ -75,6 +76,7 @@ class Prototype(Strict):
     balls: Balls  # K of them
     plan: Plan  # every picture
     stops: Stops  # of the base
+    sag: SagTable | None  # of the balls at the stops; None without the file
     plate_holes: PlateHoles | None  # of the base plate; None without the file
     program: str  # text of the controller's program
     settings: str  # text of the controller's settings
@@ -130,6 +132,7 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         "balls": Balls.read(texts[BALLS]),
         "plan": Plan.read(texts[PLAN]),
         "stops": Stops.read(texts[STOPS]),
+        "sag": SagTable.read(texts[SAG]) if SAG in texts else None,
         "plate_holes": PlateHoles.read(texts[PLATE_HOLES]) if PLATE_HOLES in texts else None,
         "program": texts[PROGRAM].text(),
         "settings": texts[SETTINGS].text(),

@@ -106,6 +106,35 @@ class Stops(Columns):
     angle: Angles = Field(alias="base_angle_deg")
 
 
+class SagTable(Columns):
+    """sag.csv: how weight moves a ball at a stop, by what bends; one pair a row, stop by stop."""
+
+    most_rows: ClassVar[int] = MOST_ROWS
+
+    stop: Counts
+    ball: Counts
+    carrier_x_mm: Numbers
+    carrier_y_mm: Numbers
+    carrier_z_mm: Numbers
+    head_x_mm: Numbers
+    head_y_mm: Numbers
+    head_z_mm: Numbers
+    shaft_x_mm: Numbers
+    shaft_y_mm: Numbers
+    shaft_z_mm: Numbers
+    uprights_x_mm: Numbers
+    uprights_y_mm: Numbers
+    uprights_z_mm: Numbers
+
+    def moved(self, shape: tuple[int, ...]) -> Floats | None:
+        """(4, S, K, 3) by carrier, head, shaft and uprights, mm; None: of others than (S, K, 3)."""
+        pairs = np.indices(shape[:2]).reshape(2, -1) + 1
+        if not np.array_equal(pairs, [self.stop, self.ball]):
+            return None
+        values = [getattr(self, name) for name in type(self).model_fields if name.endswith("_mm")]
+        return np.stack(values).reshape(4, 3, *shape[:2]).transpose(0, 2, 3, 1)
+
+
 class Seat(Strict):
     """The seat of a ball as recorded: where to begin looking for its pads."""
 
