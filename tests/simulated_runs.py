@@ -6,19 +6,21 @@ from pathlib import Path
 
 import numpy as np
 
+from tbcad.core.geometry.vectors import norm
 from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.calibration.priors import prototype_prior
-from tbcad.rig.machine.designed import designed_prototype, is_cap, random_build
+from tbcad.rig.machine.designed import designed_prototype, is_cap, random_build, sag_motion
 from tbcad.rig.machine.machine import Machine
 from tbcad.rig.runs import frames_of
 from tbcad.rig.simulated_run.led_light import Occluders
 from tbcad.rig.simulated_run.photographs import ImagingChain, SimulatedRun
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.process.process import load_process, process_errors
+from tbcad.tolerancing.prototype.gravity import weightless
 from tbcad.types import Floats
 
 FINER = 2  # pixels for one of the export's: highlights of few pixels are hard to see
@@ -65,7 +67,7 @@ def small_run(
     plan = read_plan(export)
     designed = finer(designed_prototype(export, plan))
     kinds = fdm_errors()
-    built = random_build(designed, plan, kinds, SEED, wind_up=np.zeros(len(plan.angle)))
+    built = random_build(designed, plan, kinds, SEED, gravity=weightless(plan))
     every = frames_of(plan.angle)
     kept = np.array([k for k, frame in enumerate(every) if frame.stop in stops])
     frames = tuple(every[k] for k in kept)
@@ -79,8 +81,10 @@ def small_run(
         SEED,
     )
     series = np.array([frame.object_turn_deg // 180 for frame in frames])
-    known = plan.body_centre, is_cap(plan), series
-    return Small(run, prototype_prior(designed.of_frames(kept), kinds, *known))
+    machine = designed.of_frames(kept)
+    still = [sag_motion(machine, np.zeros((len(kept), len(plan), 3)))]
+    arm = np.where(is_cap(plan), norm(plan.centre - plan.body_centre), 0.0)
+    return Small(run, prototype_prior(machine, still, kinds, arm, series))
 
 
 def photograph_centroid(image: Floats, place: Floats, radius: int) -> Floats:

@@ -44,7 +44,9 @@ class MachineRecord(Document):
         axis: unit vector of the base's axis, through axis_point_mm.
         frames: in which it is photographed; of each:
         angle_deg: of the base, and
-        shift_mm: of the base by run-out; None: it has none.
+        turn_rad: of the base beside its angle, a rotation vector about the origin, and then
+        shift_mm: of the base; None: none.
+        sag_mm: of each sphere by its weight, in the base's frame.
         leds_mm: places that the LEDs shine from.
     """
 
@@ -57,13 +59,18 @@ class MachineRecord(Document):
     angle_deg: tuple[Finite, ...] = Field(min_length=1)
     spheres: tuple[SphereRecord, ...] = Field(min_length=1)
     leds_mm: tuple[Vector, ...]
+    turn_rad: tuple[Vector, ...] | None = None
     shift_mm: tuple[Vector, ...] | None = None
+    sag_mm: tuple[tuple[Vector, ...], ...] | None = None
 
     @model_validator(mode="after")
     def _of_each_frame(self) -> Self:
-        for what, values in (("angles", self.angle_deg), ("shifts", self.shift_mm)):
+        counted = {"angles": self.angle_deg, "turns": self.turn_rad, "shifts": self.shift_mm}
+        for what, values in (counted | {"sags": self.sag_mm}).items():
             if values is not None and len(values) != len(self.frames):
                 raise ValueError(f"another number of {what} than frames")
+        if any(len(row) != len(self.spheres) for row in self.sag_mm or ()):
+            raise ValueError("another number of sags than spheres in a frame")
         return self
 
 

@@ -149,6 +149,33 @@ class StopRow(TableRow):
     wind_up_deg: float = Field(ge=-MAX_WIND_UP_DEG, le=MAX_WIND_UP_DEG)
 
 
+class SagRow(TableRow):
+    """By how much a ball's weight and that of the base move it at a stop, by what bends, mm.
+
+    In the frame of the shell; zero is where the design has it.
+    """
+
+    FILE: ClassVar[str] = "sag.csv"
+    MISSING: ClassVar[str] = (
+        'build the prototype again, with prototype.base.drive = "nema17-belt": no list says how '
+        "stiff the bearings of other drives are"
+    )
+    stop: int
+    ball: int
+    carrier_x_mm: Finite
+    carrier_y_mm: Finite
+    carrier_z_mm: Finite
+    head_x_mm: Finite
+    head_y_mm: Finite
+    head_z_mm: Finite
+    shaft_x_mm: Finite
+    shaft_y_mm: Finite
+    shaft_z_mm: Finite
+    uprights_x_mm: Finite
+    uprights_y_mm: Finite
+    uprights_z_mm: Finite
+
+
 class WiringRow(TableRow):
     """A line of the controller.
 

@@ -31,11 +31,11 @@ from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.montecarlo.sharpness import Sharpness, reference_views, sharpness
 from tbcad.tolerancing.process.process import BUILT_IN, Process, load_process, process_errors
+from tbcad.tolerancing.prototype.gravity import read_gravity
 from tbcad.tolerancing.prototype.windows import (
     PrototypeCase,
     PrototypeResult,
     prototype_model,
-    read_wind_up,
 )
 from tbcad.types import Floats
 
@@ -131,7 +131,7 @@ def analyse(
     if (export.folder / "prototype.json").is_file():
         options.progress("prototypes")
         plan = read_plan(export)
-        model = prototype_model(export.reflectors, plan, read_wind_up(export, plan))
+        model = prototype_model(export.reflectors, plan, read_gravity(export, plan))
         prototype = simulator.all_builds(PrototypeCase(model, errors, options.seed))
     return Analysis(
         process, options, target, export.reflectors, simulator.edge_models, result,

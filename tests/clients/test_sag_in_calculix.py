@@ -10,9 +10,9 @@ import pytest
 
 from tbcad.app.cli import run
 from tbcad.light.simulate.scene.reflector import read_export
+from tbcad.prototype.gravity.compliance import N_PER_G
+from tbcad.prototype.gravity.sag import build_sag
 from tbcad.records.tables import BallRow
-from tbcad.rig.gravity.compliance import N_PER_G
-from tbcad.rig.gravity.sag import build_sag
 from tbcad.types import Floats, Ints
 
 pytestmark = [

@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from trimesh import Trimesh
 from trimesh.creation import box
 
-from tbcad.rig.gravity.compliance import (
+from tbcad.prototype.gravity.compliance import (
     N_PER_G,
     Axle,
     Bodies,
@@ -18,7 +18,7 @@ from tbcad.rig.gravity.compliance import (
     shaft_compliance,
     turned_to,
 )
-from tbcad.rig.gravity.elastic import POISSON, fill_cells
+from tbcad.prototype.gravity.elastic import POISSON, fill_cells
 
 # A side of whole sub-cubes: a face is found to half of one.
 LENGTH, SIDE = 200.0, 20.0

@@ -207,17 +207,16 @@ def _with_sag(made: AsMade, folder: Path) -> AsMade:
     Not a number where it is not known: of a rotary stage's own bearings, or of files that cannot be
     read, of which the verification tells.
     """
-    from tbcad.light.simulate.scene.reflector import read_export
+    from tbcad.prototype.gravity.sag import read_sag
     from tbcad.records.prototype import NAME
-    from tbcad.rig.gravity.sag import build_sag
 
     if not (folder / NAME).is_file():
         return made
     try:
-        sag = build_sag(read_export(folder))
+        sag = read_sag(folder)
     except InputError:
-        return replace(made, sag_mm=nan)
-    return replace(made, sag_mm=sag.between_stops(sag.whole))
+        sag = None
+    return replace(made, sag_mm=sag.between_stops(sag.whole) if sag else nan)
 
 
 def as_made(

@@ -65,7 +65,7 @@ class BaseSpec(Section):
     """Ribs round the axis, one at the end toward the camera."""
     rib_mm: float = Field(5.0, ge=1.2, le=30)
     """Thickness of the ribs."""
-    rib_height_mm: float = Field(8.0, ge=1, le=50)
+    rib_height_mm: float = Field(20.0, ge=1, le=50)
     """Height of the ribs above the wall; next to the hub they are higher."""
     light_clearance_mm: float = Field(0.5, ge=0, le=20)
     """Minimum distance of the carrier from all light."""

@@ -30,7 +30,7 @@ Stretch: TypeAlias = Annotated[float, Field(ge=0.5, le=2.0)]
 EDGE_DEG = math.degrees(math.atan(2))
 MAX_DIRECTION_DEG, MEDIAN_DIRECTION_DEG = 3.5, 1.5  # of fine designs
 MEDIAN_OF_SPACING = 0.43
-LARGEST_BALL_MM, BALL_OF_MINOR = 60.0, 0.8  # heavier balls need another drive
+LARGEST_BALL_MM, BALL_OF_MINOR = 40.0, 0.8  # heavier balls bend the carrier: decision 0044
 BALL_WALL_MM, MIN_BALL_WALL_MM, WALL_OF_MINOR = 3.0, 1.2, 0.04
 POST_MM, MIN_POST_MM, POST_OF_CAPTURE = 20.0, 8.0, 1 / 3
 CAMERA_MM, MIN_CAMERA_MM, CAMERA_OF_DISTANCE = 60.0, 25.0, 0.56

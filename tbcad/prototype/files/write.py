@@ -36,6 +36,7 @@ from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_componen
 from tbcad.prototype.files import bom, controllers, tables
 from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record
 from tbcad.prototype.frame.stock import Stock
+from tbcad.prototype.gravity.sag import weighed_base, write_sag
 from tbcad.prototype.light.shroud import pattern
 from tbcad.prototype.model import build_prototype_model
 from tbcad.prototype.printed import PrintedPart, Role, component_solid, part_mesh, print_estimate
@@ -86,7 +87,10 @@ def export_prototype(
         submit(cap_sheet(title, built.base, built.layout, one).write, folder)
     progress("prototype: assembly")
     groups = [group for group in assembly_groups(built) if group.bodies]
-    submit(write_glb, folder / GLB, "prototype", coloured_meshes(groups))
+    meshes = coloured_meshes(groups)
+    submit(write_glb, folder / GLB, "prototype", meshes)
+    if base := weighed_base(built, meshes):
+        submit(write_sag, folder, base)
     write_assembly(folder / STEP, "prototype", groups)
     bill = _bill(built, [estimate.result() for estimate in prints], prices)
     write_table(folder / bom.NAME, bom.COLUMNS, bill)

@@ -56,7 +56,7 @@ from tbcad.prototype.homing import (
     tab_radius,
 )
 from tbcad.prototype.part import FrameLayout, Part, Site
-from tbcad.prototype.purchased.parts import Parts, choose_part
+from tbcad.prototype.purchased.parts import choose_part
 from tbcad.types import Floats
 
 # Behind the head of a rotary stage's screw (M6, ISO 4762): room for it, and the length of its key.
@@ -84,7 +84,7 @@ def bearing_head(site: Site, _: FrameLayout) -> BearingHead:
     """
     spec, base, axes, parts = site.spec.prototype.frame, site.base, site.axes, site.parts
     plate = _behind_disc(_head_plate(site), base, axes)
-    shaft_parts = _shaft_parts(base, plate, parts) if site.drive.belt else None
+    shaft_parts = _shaft_parts(site, plate) if site.drive.belt else None
     edge = axes @ base.point(plate.back, plate.low)
     face = float(edge[0] + OVERLAP_MM - spec.flange_mm)
     low, top = float(edge[2]) - BELOW_MM, float(edge[2]) + ABOVE_MM - plate.low
@@ -165,8 +165,14 @@ def _head_plate(site: Site) -> HeadPlate:
     return HeadPlate(face - STAGE_HEIGHT_MM, -half, max(half, MIN_PLATE_MM), half)
 
 
-def _shaft_parts(base: BaseLayout, plate: HeadPlate, parts: Parts) -> ShaftParts:
+def _shaft_parts(site: Site, plate: HeadPlate) -> ShaftParts:
+    base, parts, wheel = site.base, site.parts, site.drive.wheel
     bore, key = base.spec.shaft_mm, "prototype.base.shaft_mm"
+    if wheel and wheel["bore_mm"] != bore:
+        raise SpecError(
+            f"{key} is {bore:g}, but wheel {wheel.name} has a bore of {wheel['bore_mm']:g} mm: set "
+            "it to that"
+        )
     hint = "set it to 8, 10 or 12, or add one to the list"
     bearing = choose_part(parts, "bearings", key, hint, "width_mm", bore_mm=bore)
     collar = choose_part(parts, "collars", key, hint, "width_mm", bore_mm=bore)

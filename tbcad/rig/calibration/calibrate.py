@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import diags_array
 
+from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
@@ -25,11 +26,11 @@ from tbcad.rig.calibration.uncertainty import (
     known_rays,
     ray_slopes,
 )
-from tbcad.rig.machine.designed import designed_prototype, is_cap
+from tbcad.rig.machine.designed import designed_prototype, is_cap, sag_motion
 from tbcad.rig.machine.machine import Machine
 from tbcad.rig.machine.shells import NOT_SERVED, designed_half, half_of, plan_of
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.prototype.windows import read_wind_up
+from tbcad.tolerancing.prototype.gravity import read_gravity, weightless
 from tbcad.types import Bools, Ints, Progress
 
 MIN_HIGHLIGHTS = 10  # of a half
@@ -64,12 +65,13 @@ class Setup:
         home = Prototype.read(self.export.folder / NAME).home
         stop = np.array([frame.stop - 1 for frame in self.frames])
         known = (self.export.folder / StopRow.FILE).is_file()  # not of exports by old versions
-        wind_up = read_wind_up(self.export, self.plan)[stop] if known else 0.0
+        gravity = read_gravity(self.export, self.plan) if known else weightless(self.plan)
+        turned = replace(self.designed, angle=self.designed.angle + gravity.wind_up[stop])
         return prototype_prior(
-            replace(self.designed, angle=self.designed.angle + wind_up),
+            turned,
+            [sag_motion(turned, one[stop]) for one in gravity.sag],
             errors,
-            self.plan.body_centre,
-            is_cap(self.plan),
+            np.where(is_cap(self.plan), norm(self.plan.centre - self.plan.body_centre), 0.0),
             np.array([int(frame.object_turn_deg != 0) for frame in self.frames]),
             math.radians(home.zero_error_deg),
             self.lens is not None,

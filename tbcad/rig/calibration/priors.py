@@ -6,17 +6,17 @@ process says is a judgement, below.
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.parameters import Block, Prior, prior_of
-from tbcad.rig.machine.designed import LED_MM
+from tbcad.rig.machine.designed import LED_MM, Motion
 from tbcad.rig.machine.machine import Machine
-from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.types import Bools, Floats, Ints
 
 PRINCIPAL_SHARE = 0.01
@@ -36,9 +36,9 @@ Measured = tuple[tuple[int, float, float], ...]
 
 def prototype_prior(
     machine: Machine,
+    moved: Sequence[Motion],
     errors: Errors,
-    body_centre: Floats,
-    is_cap: Bools,
+    arm: Floats,
     series: Ints,
     zero_error: float = 0.0,
     lens_known: bool = False,
@@ -46,14 +46,14 @@ def prototype_prior(
 ) -> Prior:
     """Prior of a prototype as designed, whose balls are on a base that rotates.
 
-    Bodies in the seats are at (k, 3), mm; some are caps, (k,), made instead of purchased. Each
-    frame belongs to a series, (f,). The base's angle zero has a half width in radians. A known lens
-    is fixed; measured radii have numbers of spheres, values and standard deviations, mm.
+    Gravity moves the base in its frames, by the carrier and by what holds it. Caps, which are made
+    instead of purchased, have arms from their bodies' centres to their spheres', mm; balls have 0,
+    (k,). Each frame belongs to a series, (f,). The base's angle zero has a half width in radians.
+    A known lens is fixed; measured radii have numbers of spheres, values and standard deviations,
+    mm.
     """
-    radius, radii = _radii(machine, errors, is_cap, measured)
-    arm = norm(machine.centre - body_centre)
-    tilted = np.where(is_cap, arm * errors.cap_tilt.sigma, 0.0)
-    centres = np.hypot(errors.seat.sigma, tilted)
+    radius, radii = _radii(machine, errors, arm > 0, measured)
+    centres = np.hypot(errors.seat.sigma, arm * errors.cap_tilt.sigma)
     offset = math.hypot(zero_error / math.sqrt(3), errors.rotation_angle.sigma)
     known = _camera(machine, errors, lens_known) | {
         Block.TILT: errors.axis_tilt.sigma,
@@ -63,10 +63,30 @@ def prototype_prior(
         Block.LEDS: math.hypot(errors.shell_shift.sigma, LED_MM),
         Block.CENTRES: centres[:, None],
         Block.RADII: radii,
-        Block.ANGLES: errors.rotation_angle.sigma,
-        Block.RUNOUT: errors.axis_runout.sigma,
+        Block.ANGLES: _with_sag(errors.rotation_angle, errors, [one.angle for one in moved]),
+        Block.TURN: _with_sag(errors.axis_wobble, errors, [one.turn for one in moved]),
+        Block.SHIFT: _with_sag(errors.axis_runout, errors, [one.shift for one in moved]),
+        Block.SAG: errors.sag.sigma,
     }
-    return prior_of(replace(machine, radius=radius), series, known)
+    share = errors.sag.mean
+    mean = replace(
+        machine,
+        radius=radius,
+        angle=machine.angle + share * np.sum([one.angle for one in moved], axis=0),
+        turn=share * np.sum([one.turn for one in moved], axis=0),
+        shift=share * np.sum([one.shift for one in moved], axis=0),
+        sag=share * np.sum([one.sag for one in moved], axis=0),
+    )
+    return prior_of(mean, series, known)
+
+
+def _with_sag(error: Error, errors: Errors, moved: list[Floats]) -> float:
+    """Standard deviation of a frame's motion along each way, by an error and by what weight does.
+
+    What is predicted of each frame, (f,) or (f, 3), may be too large or small by a share.
+    """
+    ways = [np.sqrt((one**2).sum() / max(one.size, 1)) for one in moved]
+    return math.hypot(error.sigma, errors.sag.sigma * math.hypot(*ways))
 
 
 def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> Prior:

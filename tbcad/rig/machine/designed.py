@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,12 +13,14 @@ from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, balls_at_stops, prototype_run
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
+from tbcad.prototype.gravity.compliance import rigid_motion
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.run import Frame
-from tbcad.rig.machine.machine import Machine
+from tbcad.rig.machine.machine import OF_FRAMES, Machine
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.prototype.gravity import Gravity
 from tbcad.tolerancing.prototype.windows import PrototypeDraws, draw_prototypes, tilted_centres
 from tbcad.types import Bools, Floats
 
@@ -121,15 +124,25 @@ def stops_known(plan: Plan, frames: tuple[Frame, ...]) -> Bools:
 
 def _balls(plan: Plan, machine: Machine, frames: tuple[Frame, ...], turn: int) -> Floats:
     """Balls at all stops of one run, as of `PrototypeRun`, (s, k, 8)."""
-    angle, shift = plan.angle.copy(), np.zeros((len(plan.angle), 3))
-    shifts = np.zeros((len(frames), 3)) if machine.shift is None else machine.shift
-    for frame, found, moved in zip(frames, machine.angle, shifts, strict=True):
-        if frame.object_turn_deg == turn and frame.stop <= len(angle):
-            angle[frame.stop - 1], shift[frame.stop - 1] = found, moved
+    stops = len(plan.angle)
+    known = [
+        (frame.stop - 1, number)
+        for number, frame in enumerate(frames)
+        if frame.object_turn_deg == turn and frame.stop <= stops
+    ]
+    at, number = np.array(known, dtype=np.int64).reshape(-1, 2).T
+    every: dict[str, Any] = {"angle": plan.angle.copy()}
+    every["angle"][at] = machine.angle[number]
+    for name in OF_FRAMES:
+        if (values := getattr(machine, name)) is not None:
+            every[name] = np.zeros((stops, *values.shape[1:]))
+            every[name][at] = values[number]
+    there = replace(machine, **every)
+    stop = np.repeat(np.arange(stops), len(plan))
 
     def place(points: Floats) -> Floats:
-        turned = rotated(points - machine.axis_point, machine.axis, angle[:, None])
-        return np.asarray(machine.axis_point + turned + shift[:, None])
+        on_base = points if there.sag is None else points + there.sag
+        return there.placed(on_base.reshape(-1, 3), stop).reshape(points.shape)
 
     return balls_at_stops(plan, machine.centre, machine.radius, place)
 
@@ -158,26 +171,52 @@ def designed_build(designed: Machine, plan: Plan) -> BuiltPrototype:
     return BuiltPrototype(designed, plan.body_centre, plan.body_radius)
 
 
-def random_build(
-    designed: Machine, plan: Plan, errors: Errors, seed: int, *, wind_up: Floats
-) -> BuiltPrototype:
-    """The first simulated build, the same that `tbcad tolerance` has, with a real lens and LEDs.
+@dataclass(frozen=True)
+class Motion:
+    """How the base of f frames is moved beside its angle, and its k balls on it; see Machine."""
 
-    The wind-up is the turn of the base under gravity at the plan's stops, radians, (t,).
+    angle: Floats  # further about the axis, radians, (f,)
+    turn: Floats  # radians, (f, 3)
+    shift: Floats  # mm, (f, 3)
+    sag: Floats  # mm, (f, k, 3)
+
+
+def sag_motion(machine: Machine, sag: Floats) -> Motion:
+    """Displacements of balls in the base's frame, mm, (f, k, 3), as the best motion and the rest.
+
+    To first order, for an axis through the origin.
     """
-    draws = draw_prototypes(errors, seed, [0], is_cap(plan), wind_up)
+    rigid = rigid_motion(machine.centre).reshape(-1, 6)
+    fitted = sag.reshape(len(sag), -1) @ np.linalg.pinv(rigid).T
+    rest = sag - (fitted @ rigid.T).reshape(sag.shape)
+    shift, turn = (
+        rotated(one, machine.axis, machine.angle) for one in (fitted[:, :3], fitted[:, 3:])
+    )
+    angle = turn @ machine.axis
+    return Motion(angle, turn - angle[:, None] * machine.axis, shift, rest)
+
+
+def random_build(
+    designed: Machine, plan: Plan, errors: Errors, seed: int, *, gravity: Gravity
+) -> BuiltPrototype:
+    """The first simulated build, the same that `tbcad tolerance` has, with a real lens and LEDs."""
+    draws = draw_prototypes(errors, seed, [0], is_cap(plan), gravity.wind_up)
+    moved = sag_motion(designed, np.tile(gravity.sagged(draws.sag[0]), (RUNS, 1, 1)))
+    across = plan.frame[1:]
     other = draw_other_errors(len(designed.leds), seed)
-    tilt = Rotation.from_rotvec(draws.tilt[0] @ plan.frame[1:])
+    tilt = Rotation.from_rotvec(draws.tilt[0] @ across)
     seats = draws.seat[0]
     machine = Machine(
         camera=built_camera(designed.camera, draws, other),
         axis=tilt.apply(designed.axis),
         axis_point=designed.axis_point,
-        angle=designed.angle + draws.angle[0].ravel(),
+        angle=designed.angle + draws.angle[0].ravel() + moved.angle,
         centre=tilt.apply(tilted_centres(plan, draws.cap_tilt[0]) + seats),
         radius=plan.radius + draws.radius[0],
         leds=designed.leds + other.leds,
-        shift=(draws.runout[0] @ plan.frame[1:]).reshape(-1, 3),
+        turn=moved.turn + (draws.wobble[0] @ across).reshape(-1, 3),
+        shift=moved.shift + (draws.runout[0] @ across).reshape(-1, 3),
+        sag=moved.sag,
     )
     # A ball is its own body, too large or too small as it is.
     body_radius = np.where(is_cap(plan), plan.body_radius, machine.radius)

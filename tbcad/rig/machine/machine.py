@@ -8,8 +8,10 @@ one frame, whose spheres are its mirrors. machine.json has its state, calibrated
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import norm
@@ -27,6 +29,8 @@ CAMERA = {
     **{"principal": "principal_px", "distortion": "distortion"},
 }
 """Arrays of a camera, and their keys in machine.json."""
+OF_FRAMES = {"turn": "turn_rad", "shift": "shift_mm", "sag": "sag_mm"}
+"""Arrays of a machine's frames that it may lack, and their keys there."""
 ROUNDING = 1e-9  # of unit vectors
 
 
@@ -41,19 +45,33 @@ class Machine:
     centre: Floats  # of the reflecting spheres at base angle zero, mm, (k, 3)
     radius: Floats  # of the reflecting spheres, mm, (k,)
     leds: Floats  # where each LED shines from, mm, (l, 3)
-    # of the base in each frame, beside its rotation, mm, (f, 3); None for nowhere
+    # of the base in each frame beside its angle: rotation vector about the origin, radians, and
+    # then a shift, mm, (f, 3); None for none
+    turn: Floats | None = None
     shift: Floats | None = None
+    # of the spheres in each frame by their weight, in the base's frame, mm, (f, k, 3)
+    sag: Floats | None = None
 
     def centres(self, frame: Ints, sphere: Ints) -> Floats:
         """Centres of spheres (n,) in frames (n,), mm, (n, 3)."""
-        turned = rotated(self.centre[sphere] - self.axis_point, self.axis, self.angle[frame])
+        on_base = self.centre[sphere]
+        if self.sag is not None:
+            on_base = on_base + self.sag[frame, sphere]
+        return self.placed(on_base, frame)
+
+    def placed(self, on_base: Floats, frame: Ints) -> Floats:
+        """Where points of the base (n, 3) are in frames (n,), mm, (n, 3)."""
+        turned = rotated(on_base - self.axis_point, self.axis, self.angle[frame])
         placed = np.asarray(self.axis_point + turned)
+        if self.turn is not None:
+            placed = Rotation.from_rotvec(self.turn[frame]).apply(placed)
         return placed if self.shift is None else placed + self.shift[frame]
 
     def of_frames(self, frames: Ints) -> "Machine":
         """The same machine in some of its frames (g,)."""
-        shift = None if self.shift is None else self.shift[frames]
-        return replace(self, angle=self.angle[frames], shift=shift)
+        every = {name: getattr(self, name) for name in OF_FRAMES}
+        some: Any = {name: None if one is None else one[frames] for name, one in every.items()}
+        return replace(self, angle=self.angle[frames], **some)
 
     def moved(self, shift: Floats) -> "Machine":
         """The same machine as a whole elsewhere, by a shift in mm, (3,)."""
@@ -111,8 +129,12 @@ def write_machine(path: Path, machine: Machine, frames: tuple[Frame, ...]) -> No
         angle_deg=np.degrees(machine.angle).tolist(),
         spheres=tuple(SphereRecord(centre_mm=at, radius_mm=radius) for at, radius in spheres),
         leds_mm=machine.leds.tolist(),
-        shift_mm=None if machine.shift is None else machine.shift.tolist(),
+        **{key: _listed(getattr(machine, name)) for name, key in OF_FRAMES.items()},
     ).write(path)
+
+
+def _listed(values: Floats | None) -> list[Any] | None:
+    return None if values is None else values.tolist()
 
 
 def read_machine(path: Path) -> tuple[Machine, tuple[Frame, ...]]:
@@ -134,6 +156,9 @@ def read_machine(path: Path) -> tuple[Machine, tuple[Frame, ...]]:
         centre=np.array([sphere.centre_mm for sphere in found.spheres]),
         radius=np.array([sphere.radius_mm for sphere in found.spheres]),
         leds=np.array(found.leds_mm).reshape(-1, 3),
-        shift=None if found.shift_mm is None else np.array(found.shift_mm),
+        **{
+            name: None if getattr(found, key) is None else np.array(getattr(found, key))
+            for name, key in OF_FRAMES.items()
+        },
     )
     return machine, found.frames

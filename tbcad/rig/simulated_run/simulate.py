@@ -53,7 +53,7 @@ from tbcad.rig.simulated_run.photographs import (
 )
 from tbcad.rig.simulated_run.sensor import Image16, SimulatedSensor
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.prototype.windows import read_wind_up
+from tbcad.tolerancing.prototype.gravity import read_gravity
 from tbcad.types import Progress
 
 CAMERA = "simulated"
@@ -109,8 +109,8 @@ def _prototype(export: ExportedDesign, errors: Errors, options: SimulateRunOptio
     if options.perfect:
         built = designed_build(designed, plan)
     else:
-        wind_up = read_wind_up(export, plan)
-        built = random_build(designed, plan, errors, options.seed, wind_up=wind_up)
+        gravity = read_gravity(export, plan)
+        built = random_build(designed, plan, errors, options.seed, gravity=gravity)
     return ((built, frames_of(plan.angle)),)
 
 

@@ -1,6 +1,6 @@
 """The kinds of error of a process, with their spread and mean: read before numpy is loaded."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, sqrt
 from typing import TYPE_CHECKING, Literal
 
@@ -35,6 +35,7 @@ class Error:
 
 
 NO_ERROR = Error()
+BEARINGS_MM = 50.0  # between the bearings of a prototype's shaft, as its head has them, about
 
 
 @dataclass(frozen=True)
@@ -62,11 +63,17 @@ class Errors:
     seat: Error = NO_ERROR
     cap_tilt: Error = NO_ERROR
     wind_up: Error = NO_ERROR
+    sag: Error = NO_ERROR
     warp: Error = NO_ERROR  # of length 0 an error of each mirror's centre
     waviness: Error = NO_ERROR
     groove_wall: Error = NO_ERROR
     cutter_radius: Error = NO_ERROR  # of fillets that it leaves in the valleys
     ridge_rounding: Error = NO_ERROR  # of the fillets there that a mandrel's ridges leave
+
+    @property
+    def axis_wobble(self) -> Error:
+        """Direction of the base at a stop, by run-outs of both bearings, one against the other."""
+        return replace(self.axis_runout, spread=self.axis_runout.spread * sqrt(2) / BEARINGS_MM)
 
     @property
     def whole_radius(self) -> Error:

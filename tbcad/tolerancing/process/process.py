@@ -107,6 +107,9 @@ class Process(Section):
     """Prototype: each cap about each axis across its own."""
     wind_up_percent: Percent
     """Prototype: turn of the base because motor and belt yield to gravity, of that worked out."""
+    sag_percent: Percent
+    """Prototype: displacements of the balls by weight, of those worked out; of the carrier and of
+    what holds it."""
     cutter_radius_mm: FilletRadius = FilletRadius(magnitude=0, source=SHARP)
     """Ball cutter that mills the valleys between mirrors of a shell: 0 for sharp valleys."""
     ridge_rounding_um: FilletMicrometres = FilletMicrometres(magnitude=0, source=SHARP)

@@ -15,20 +15,18 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays, reflection_points
 from tbcad.core.optics.windows import cell_windows
-from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, PrototypeRun, prototype_runs
-from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
-from tbcad.records.tables import StopRow
+from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.builds import CoverageResult
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
 from tbcad.tolerancing.montecarlo.draws import Shape, draw_kinds
 from tbcad.tolerancing.montecarlo.edge_model import ASYMMETRIC
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
+from tbcad.tolerancing.prototype.gravity import Gravity
 from tbcad.tolerancing.prototype.rays import SIDE_SAMPLES, minimum_miss_distances
 from tbcad.types import Bools, Floats, Ints
 
@@ -41,7 +39,7 @@ class PrototypeDraws:
     """Errors of s prototypes of k balls and t stops, in the order of the builds.
 
     The base goes through its stops twice, for camera a's mirrors and for camera b's. A point x of
-    the designed base is moved to R(tilt) R(axis, stop's angle + angle) x + runout.
+    the designed base is moved to R(wobble) R(tilt) R(axis, stop's angle + angle) x + runout.
     """
 
     radius: Floats  # by which balls are too large, mm, (s, k)
@@ -49,6 +47,9 @@ class PrototypeDraws:
     cap_tilt: Floats  # of caps about two axes across their own, radians, (s, k, 2)
     angle: Floats  # of the base at stops of both runs, with gravity, radians, (s, 2, t)
     runout: Floats  # of the axis there, along azimuth zero and across it, mm, (s, 2, t, 2)
+    # of the base about azimuth zero and across it at those stops, at the object, radians
+    wobble: Floats  # (s, 2, t, 2)
+    sag: Floats  # of displacements by weight as in `Gravity`, as shares of them, (s, 2)
     tilt: Floats  # of the axis about azimuth zero and across, at the object, radians, (s, 2)
     camera_shift: Floats  # of the pinhole, mm, (s, 3)
     camera_tilt: Floats  # rotation vectors about the pinhole, radians, (s, 3)
@@ -80,6 +81,8 @@ def draw_prototypes(
         "camera_focal": (),
         "cap_tilt": (k, 2),
         "wind_up": (),
+        "sag": (2,),
+        "axis_wobble": (2, t, 2),
     }
     errors = replace(errors, sphere_radius=errors.whole_radius)
     drawn = draw_kinds(errors, seed, builds, shapes, FIRST_STREAM)
@@ -89,26 +92,13 @@ def draw_prototypes(
         cap_tilt=np.where(is_cap[:, None], drawn["cap_tilt"], 0.0),
         angle=drawn["rotation_angle"] + drawn["wind_up"][:, None, None] * wind_up,
         runout=drawn["axis_runout"],
+        wobble=drawn["axis_wobble"],
+        sag=drawn["sag"],
         tilt=drawn["axis_tilt"],
         camera_shift=drawn["camera_shift"],
         camera_tilt=drawn["camera_tilt"],
         focal=1 + drawn["camera_focal"],
     )
-
-
-def read_wind_up(export: ExportedDesign, plan: Plan) -> Floats:
-    """Angles (t,) by which the base is beyond those of the plan at its t stops, radians.
-
-    Motor and belt yield to the base's weight: see tbcad.prototype.drive.drive. InputError if the
-    file is missing, malformed, or of another plan.
-    """
-    path = export.folder / StopRow.FILE
-    rows = StopRow.read(export.folder)
-    if [row.stop for row in rows] != list(range(1, len(plan.angle) + 1)):
-        raise InputError(
-            f"{path}: stops are not those of the plan, 1 to {len(plan.angle)}: {REBUILD}"
-        )
-    return np.radians([row.wind_up_deg for row in rows])
 
 
 @dataclass(frozen=True)
@@ -133,7 +123,7 @@ class PrototypeWindows:
     plan: Plan
     runs: tuple[RunWindows, RunWindows]  # for camera a's mirrors and for camera b's
     virtual: Ints  # number of each mirror's virtual camera, a's mirrors, then b's, (2 m,)
-    wind_up: Floats  # turn of the base under gravity at each of t stops, radians, (t,)
+    gravity: Gravity  # at its stops
 
     @property
     def is_cap(self) -> Bools:
@@ -143,19 +133,19 @@ class PrototypeWindows:
     @cached_property
     def designed_rays(self) -> list[tuple[Floats, Floats]]:
         """Of each run without errors: see `_middle_rays`."""
-        exact = draw_prototypes(Errors(), 0, [0], self.is_cap, self.wind_up)
+        exact = draw_prototypes(Errors(), 0, [0], self.is_cap, self.gravity.wind_up)
         return [_middle_rays(run, run_pose(self, exact, 0, k)) for k, run in enumerate(self.runs)]
 
 
 def prototype_model(
-    reflectors: tuple[Reflector, Reflector], plan: Plan, wind_up: Floats
+    reflectors: tuple[Reflector, Reflector], plan: Plan, gravity: Gravity
 ) -> PrototypeWindows:
-    """The fast model of both cameras, the plan, and the base's turn under gravity at its stops."""
+    """The fast model of both cameras, the plan, and what gravity does at its stops."""
     (a, b), view = prototype_runs(reflectors, plan), reflectors[0].camera
     axes = view.axes
     both = _run_windows(a, axes), _run_windows(b, axes * HALF_TURN)
     virtual = virtual_camera_numbers(both[1].halved)
-    return PrototypeWindows(view.pinhole, axes, plan, both, virtual, wind_up)
+    return PrototypeWindows(view.pinhole, axes, plan, both, virtual, gravity)
 
 
 def _run_windows(run: PrototypeRun, axes: Floats) -> RunWindows:
@@ -205,7 +195,7 @@ class PrototypeCase:
     def __call__(self, builds: range) -> PrototypeResult:
         """Result of the builds of these numbers."""
         model = self.model
-        draws = draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.wind_up)
+        draws = draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.gravity.wind_up)
         return prototype_result(model, draws)
 
 
@@ -224,10 +214,12 @@ def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: i
     """Camera and balls when each mirror of one run is photographed."""
     run, plan = model.runs[half], model.plan
     on_base = (tilted_centres(plan, draws.cap_tilt[build]) + draws.seat[build])[run.ball]
+    on_base = on_base + model.gravity.sagged(draws.sag[build])[run.stop, run.ball]
     angle = plan.angle[run.stop] + draws.angle[build, half, run.stop]
     tilt = Rotation.from_rotvec(draws.tilt[build] @ plan.frame[1:])
     runout = draws.runout[build, half, run.stop] @ plan.frame[1:]
-    centre = tilt.apply(rotated(on_base, plan.frame[0], angle)) + runout
+    wobble = Rotation.from_rotvec(draws.wobble[build, half, run.stop] @ plan.frame[1:])
+    centre = wobble.apply(tilt.apply(rotated(on_base, plan.frame[0], angle))) + runout
     radius = plan.radius[run.ball] + draws.radius[build, run.ball]
     pinhole = model.pinhole + draws.camera_shift[build]
     # A longer focal length makes pictures larger: a pixel's ray is nearer to the axis.

@@ -1,6 +1,5 @@
 """A small prototype whose run is calibrated from simulated highlights."""
 
-import numpy as np
 import pytest
 
 from tbcad.light.simulate.scene.reflector import ExportedDesign
@@ -10,6 +9,7 @@ from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.calibration.study import designed_setup
 from tbcad.rig.machine.designed import BuiltPrototype, random_build
 from tbcad.tolerancing.process.process import load_process, process_errors
+from tbcad.tolerancing.prototype.gravity import weightless
 from tests.rig.calibration.machines import every_highlight, small_machine, small_prior
 
 ERRORS = process_errors(load_process("fdm"))
@@ -29,8 +29,8 @@ def prior() -> Prior:
 
 @pytest.fixture(scope="session")
 def built(setup: Setup) -> BuiltPrototype:
-    still = np.zeros(len(setup.plan.angle))
-    return random_build(setup.designed, setup.plan, ERRORS, seed=3, wind_up=still)
+    none = weightless(setup.plan)
+    return random_build(setup.designed, setup.plan, ERRORS, seed=3, gravity=none)
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import Camera, without_distortion
 from tbcad.rig.calibration.estimate.parameters import Prior
 from tbcad.rig.calibration.priors import prototype_prior
+from tbcad.rig.machine.designed import sag_motion
 from tbcad.rig.machine.machine import Highlights, Machine
 from tbcad.tolerancing.process.process import load_process, process_errors
 
@@ -42,11 +43,13 @@ def small_machine(balls: int = 5, stops: int = 12, leds: int = 4) -> Machine:
 
 
 def small_prior(machine: Machine, process: str = "fdm") -> Prior:
-    """Its prior; the last ball is a cap on a smaller body."""
-    is_cap = np.arange(len(machine.radius)) == len(machine.radius) - 1
-    body = machine.centre + np.where(is_cap[:, None], 5.0, 0.0)
+    """Its prior; the last ball is a cap on a smaller body, and weight bends the base."""
+    arm = np.where(np.arange(len(machine.radius)) == len(machine.radius) - 1, 8.0, 0.0)
     series = np.repeat([0, 1], len(machine.angle) // 2)
-    return prototype_prior(machine, process_errors(load_process(process)), body, is_cap, series)
+    down = np.stack([np.cos(machine.angle), np.sin(machine.angle)], axis=1)
+    bends = np.random.default_rng(0).normal(0, 0.4, (2, len(arm), 3, 2))
+    moved = [sag_motion(machine, np.einsum("kxa,fa->fkx", one, down)) for one in bends]
+    return prototype_prior(machine, moved, process_errors(load_process(process)), arm, series)
 
 
 def drawn(prior: Prior, seed: int) -> tuple[np.ndarray, Machine]:

@@ -23,7 +23,8 @@ from tbcad.rig.machine.designed import (
     stops_known,
 )
 from tbcad.rig.machine.machine import Machine, read_machine, write_machine
-from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.montecarlo.error_kinds import BEARINGS_MM, Error, Errors
+from tbcad.tolerancing.prototype.gravity import weightless
 from tests.machine_states import frames_of, machine_of, perturbed
 
 FORWARD = unit(np.array([-0.2, 0.0, 1.0]))
@@ -99,7 +100,7 @@ def designed(export: ExportedDesign, plan: Plan) -> Machine:
 
 def still_build(designed: Machine, plan: Plan, errors: Errors) -> BuiltPrototype:
     """A build that gravity does not turn."""
-    return random_build(designed, plan, errors, seed=5, wind_up=np.zeros(len(plan.angle)))
+    return random_build(designed, plan, errors, seed=5, gravity=weightless(plan))
 
 
 def test_a_build_without_errors_of_the_process_has_those_of_lens_and_leds(
@@ -121,12 +122,16 @@ def test_a_moved_optical_axis_is_turned_back(designed: Machine, plan: Plan) -> N
 
 
 def test_runout_moves_the_spheres_across_the_axis(designed: Machine, plan: Plan) -> None:
-    built = still_build(designed, plan, Errors(axis_runout=Error(0.01)))
+    built = still_build(designed, plan, Errors(axis_runout=Error(0.01))).machine
     frames, spheres = np.arange(len(designed.angle)), np.zeros(len(designed.angle), dtype=int)
-    moved = built.machine.centres(frames, spheres) - designed.centres(frames, spheres)
+    straight = replace(built, turn=None)
+    moved = straight.centres(frames, spheres) - designed.centres(frames, spheres)
     assert moved @ designed.axis == pytest.approx(0, abs=1e-12)
     # Two components of 0.01 mm each: the mean square of the distance is twice its square.
     assert (moved**2).sum(axis=1).mean() == pytest.approx(2e-4, rel=0.5)
+    assert built.turn is not None
+    # The run-outs of both bearings, one against the other.
+    assert (built.turn**2).sum(axis=1).mean() == pytest.approx(4e-4 / BEARINGS_MM**2, rel=0.5)
 
 
 def test_axis_and_spheres_tilt_together(designed: Machine, plan: Plan) -> None:

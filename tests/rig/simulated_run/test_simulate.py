@@ -16,7 +16,7 @@ from tbcad.rig.runs import read_photograph, read_run
 from tbcad.rig.simulated_run import simulate
 from tbcad.rig.simulated_run.photographs import SimulatedRun
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.prototype.windows import read_wind_up
+from tbcad.tolerancing.prototype.gravity import read_gravity
 from tests.exported_files import contents
 from tests.prototype_records import printed_part, write_prototype
 from tests.simulated_runs import Small, fdm_errors, small_run
@@ -129,7 +129,7 @@ def test_seeds_make_different_builds(export_with_wind_up: Path) -> None:
 
 def test_gravity_turns_the_base_as_the_export_says(export_with_wind_up: Path, plan: Plan) -> None:
     (run,), _ = prepared(export_with_wind_up, Errors(wind_up=Error(mean=1.0)))
-    wind_up = read_wind_up(read_export(export_with_wind_up), plan)
+    wind_up = read_gravity(read_export(export_with_wind_up), plan).wind_up
     assert wind_up.max() > 0
     assert run.built.machine.angle == pytest.approx(np.tile(plan.angle + wind_up, 2), abs=1e-12)
 

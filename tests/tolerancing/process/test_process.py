@@ -151,6 +151,7 @@ class TestErrors:
             "waviness": Error(0.002),
             "rotation_angle": Error(2 * degree, degree),
             "wind_up": Error(0.02, 0.01),
+            "sag": Error(0.02, 0.01),
         }
         for name, error in vars(got).items():
             assert name in others or error == known.get(name, Error(0.002, 0.001)), name

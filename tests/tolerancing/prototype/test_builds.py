@@ -15,6 +15,7 @@ from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.tolerancing.montecarlo.builds import simulate
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tbcad.tolerancing.prototype.gravity import Gravity
 from tbcad.tolerancing.prototype.windows import (
     PrototypeCase,
     PrototypeDraws,
@@ -39,6 +40,7 @@ SPREAD = {
     "camera_tilt": Error(2e-3),
     "camera_focal": Error(3e-3),
     "wind_up": Error(0.2, mean=1.0),
+    "sag": Error(0.2, mean=1.0),
 }
 # The slow models sample the sides, which are long at n = 6; so far they may be above the minimum.
 SAMPLES = 513
@@ -60,8 +62,14 @@ def plan(layout: PrototypeLayout) -> Plan:
 
 @pytest.fixture(scope="module")
 def model(small_design: MirrorDesign, plan: Plan) -> PrototypeWindows:
-    """Gravity turns its base as the sine of the base angle."""
-    return prototype_model(reflectors(small_design), plan, 4e-3 * np.sin(plan.angle))
+    """Gravity turns and bends its base with the base angle."""
+    return prototype_model(reflectors(small_design), plan, gravity_at(plan))
+
+
+def gravity_at(plan: Plan) -> Gravity:
+    down = np.stack([np.cos(plan.angle), np.sin(plan.angle)])
+    bends = np.random.default_rng(1).normal(0, 0.2, (2, 2, len(plan), 3))
+    return Gravity(4e-3 * np.sin(plan.angle), np.einsum("wt,pwkx->ptkx", down, bends))
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +78,7 @@ def runs(small_design: MirrorDesign, plan: Plan) -> Runs:
 
 
 def draws_of(model: PrototypeWindows, count: int, **errors: Error) -> PrototypeDraws:
-    return draw_prototypes(Errors(**errors), 7, range(count), model.is_cap, model.wind_up)
+    return draw_prototypes(Errors(**errors), 7, range(count), model.is_cap, model.gravity.wind_up)
 
 
 @pytest.fixture(scope="module")
@@ -125,8 +133,11 @@ def balls(
     for i, (ball, stop) in enumerate(zip(run.ball, run.stop, strict=True)):
         angle = model.plan.angle[stop] + draws.angle[build, half, stop]
         drift = draws.runout[build, half, stop]
-        about = tilt * Rotation.from_rotvec(angle * frame[0])
-        centre[i] = about.apply(on_base[ball]) + drift[0] * frame[1] + drift[1] * frame[2]
+        wobble = Rotation.from_rotvec(draws.wobble[build, half, stop] @ frame[1:])
+        about = wobble * tilt * Rotation.from_rotvec(angle * frame[0])
+        carrier, rest = (draws.sag[build] * model.gravity.sag[:, stop, ball].T).T
+        place = about.apply(on_base[ball] + carrier + rest)
+        centre[i] = place + drift[0] * frame[1] + drift[1] * frame[2]
     return centre, (model.plan.radius + draws.radius[build])[run.ball]
 
 

@@ -86,8 +86,11 @@ class AsBuilt(Strict):
     # positions in which it was measured
     frames: list[MachineFrame] = Field(min_length=1, max_length=MOST)
     angle_deg: list[float] = Field(max_length=MOST)  # of the base in each
-    # of the base in each, mm; None for nowhere
+    # of the base in each: rotation vectors about the origin, radians, then shifts, mm; None: none
+    turn: list[Vector] | None = Field(None, alias="turn_rad", max_length=MOST)
     shift: list[Vector] | None = Field(None, alias="shift_mm", max_length=MOST)
+    # of each ball in each by its weight, in the base's frame, mm
+    sag: list[list[Vector]] | None = Field(None, alias="sag_mm", max_length=MOST)
     # reflecting spheres
     balls: list[MeasuredBall] = Field(alias="spheres", min_length=1, max_length=MOST)
 
@@ -95,9 +98,11 @@ class AsBuilt(Strict):
     def _consistent(self) -> Self:
         if abs(float(np.linalg.norm(self.axis)) - 1) > SQUARE:
             raise ValueError("has an axis of another length than 1")
-        counts = {len(self.frames), len(self.angle_deg), len(self.shift or self.frames)}
-        if len(counts) > 1:
-            raise ValueError("has another number of angles or shifts than of frames")
+        given = [one for one in (self.turn, self.shift, self.sag) if one is not None]
+        if {len(self.angle_deg), *map(len, given)} != {len(self.frames)}:
+            raise ValueError("has another number of angles, turns, shifts or sags than of frames")
+        if any(len(row) != len(self.balls) for row in self.sag or ()):
+            raise ValueError("has another number of sags than of spheres in a frame")
         places = [(frame.turn, frame.stop) for frame in self.frames]
         if len(set(places)) != len(places):
             raise ValueError("has a frame twice")
@@ -118,13 +123,17 @@ class AsBuilt(Strict):
         number = {frame.stop: k for k, frame in enumerate(self.frames) if frame.turn == turn}
         return np.array([number.get(one, -1) for one in stop.tolist()], dtype=np.int64)
 
-    def placed(self, centre: Floats, frame: Ints) -> Floats:
-        """(3, N) where points (3, N) of the base are in frames (N,), mm."""
+    def placed(self, centre: Floats, ball: Ints, frame: Ints) -> Floats:
+        """(3, N) where balls (N,), at (3, N) on the base, are in frames (N,), mm."""
         angle = np.radians(np.array(self.angle_deg)[frame])
-        turn = Rotation.from_rotvec(angle[:, None] * self.axis)
-        shift = np.zeros(3) if self.shift is None else np.array(self.shift)[frame]
-        point = self.axis_point
-        return np.asarray((point + turn.apply(centre.T - point) + shift).T)
+        none, point = np.zeros(3), self.axis_point
+        sag = none if self.sag is None else np.array(self.sag)[frame, ball]
+        rotation = Rotation.from_rotvec(angle[:, None] * self.axis)
+        placed = point + rotation.apply(centre.T + sag - point)
+        if self.turn is not None:
+            placed = Rotation.from_rotvec(np.array(self.turn)[frame]).apply(placed)
+        shift = none if self.shift is None else np.array(self.shift)[frame]
+        return np.asarray((placed + shift).T)
 
 
 def read_machine(folder: Path) -> AsBuilt:

@@ -87,8 +87,9 @@ def half_views(
     if known.size == 0:
         return views
     shell = _taken(half.shell, known)
-    ball = machine.placed(centre[:, half.ball[known]], half.frame[known])
-    radius, pinhole = machine.radius[half.ball[known]], machine.camera.pinhole
+    which = half.ball[known]
+    ball = machine.placed(centre[:, which], which, half.frame[known])
+    radius, pinhole = machine.radius[which], machine.camera.pinhole
     apex = highlights(pinhole, ball, radius, np.zeros(3))
     start = shell.apex if context.moved else half.designed[:, known]
     before, after = _sight(start, shell.pinhole), _sight(apex, pinhole)

@@ -32,11 +32,11 @@ from tbcad_verify.types import Bools, Floats
 
 SCHEMA = "tbcad-prototype/2"
 RECORD, GLB = "prototype.json", "prototype.glb"
-PLATE_HOLES = "plate_holes.csv"
+PLATE_HOLES, SAG = "plate_holes.csv", "sag.csv"
 BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"
 SETTINGS = "grbl_settings.txt"
 KLIPPER, KLIPPER_CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"
-OPTIONAL = (PLATE_HOLES, KLIPPER, KLIPPER_CONFIG)
+OPTIONAL = (PLATE_HOLES, SAG, KLIPPER, KLIPPER_CONFIG)
 MOST = 1000  # balls, parts or LEDs
 MOST_ROWS = 400_000
 LARGEST = 1e9
@@ -121,6 +121,35 @@ class Stops(Columns):
 
     stop: Counts
     angle: Angles = Field(alias="base_angle_deg")
+
+
+class SagTable(Columns):
+    """sag.csv: how weight moves a ball at a stop, by what bends; one pair a row, stop by stop."""
+
+    most_rows: ClassVar[int] = MOST_ROWS
+
+    stop: Counts
+    ball: Counts
+    carrier_x_mm: Numbers
+    carrier_y_mm: Numbers
+    carrier_z_mm: Numbers
+    head_x_mm: Numbers
+    head_y_mm: Numbers
+    head_z_mm: Numbers
+    shaft_x_mm: Numbers
+    shaft_y_mm: Numbers
+    shaft_z_mm: Numbers
+    uprights_x_mm: Numbers
+    uprights_y_mm: Numbers
+    uprights_z_mm: Numbers
+
+    def moved(self, shape: tuple[int, ...]) -> Floats | None:
+        """(4, S, K, 3) by carrier, head, shaft and uprights, mm; None: of others than (S, K, 3)."""
+        pairs = np.indices(shape[:2]).reshape(2, -1) + 1
+        if not np.array_equal(pairs, [self.stop, self.ball]):
+            return None
+        values = [getattr(self, name) for name in type(self).model_fields if name.endswith("_mm")]
+        return np.stack(values).reshape(4, 3, *shape[:2]).transpose(0, 2, 3, 1)
 
 
 class Seat(Strict):
@@ -306,6 +335,7 @@ class Prototype(Strict):
     balls: Balls  # K of them
     plan: Plan  # every picture
     stops: Stops  # of the base
+    sag: SagTable | None  # of the balls at the stops; None without the file
     plate_holes: PlateHoles | None  # of the base plate; None without the file
     program: str  # text of the controller's program
     settings: str  # text of the controller's settings
@@ -361,6 +391,7 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         "balls": Balls.read(texts[BALLS]),
         "plan": Plan.read(texts[PLAN]),
         "stops": Stops.read(texts[STOPS]),
+        "sag": SagTable.read(texts[SAG]) if SAG in texts else None,
         "plate_holes": PlateHoles.read(texts[PLATE_HOLES]) if PLATE_HOLES in texts else None,
         "program": texts[PROGRAM].text(),
         "settings": texts[SETTINGS].text(),

@@ -124,10 +124,14 @@ def sag(
     input.
     """
     check_is_export(folder)
-    from tbcad.light.simulate.scene.reflector import read_export
-    from tbcad.rig.gravity.sag import build_sag
+    from tbcad.output.manifest import read_manifest, written_file
+    from tbcad.prototype.gravity.sag import read_sag
+    from tbcad.records.tables import BallRow, SagRow, StopRow
 
-    found = build_sag(read_export(folder))
+    for row in (BallRow, StopRow, SagRow):
+        written_file(folder, read_manifest(folder), row.FILE, row.MISSING)
+    found = read_sag(folder)
+    assert found is not None  # there is a file
     print_result(found.record(), found.lines(), json)
     return 0
 

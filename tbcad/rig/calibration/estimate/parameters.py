@@ -6,8 +6,8 @@ of that in `sphere_slopes`, and its standard deviation in tbcad.rig.calibration.
 
 Gauge: photographs do not change when camera, axis, spheres and LEDs are moved or rotated together,
 when all lengths grow, when the base's angles are offset and the spheres rotated back, when the
-point of the axis slides along it, or when one of its run-outs is common to all frames. The prior
-alone fixes these; the point slides not at all, and run-out is across the axis only.
+point of the axis slides along it, or when a turn or a shift is common to all frames. The prior
+alone fixes these; the point slides not at all.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation
 
 from tbcad.core.geometry.rotations import rotated
-from tbcad.core.geometry.vectors import perpendicular_axes
+from tbcad.core.geometry.vectors import norm, perpendicular_axes
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Bools, Floats, Ints
 
@@ -65,14 +65,19 @@ class Block(StrEnum):
     CENTRES = "centres", Of.SPHERE, 3  # mm
     RADII = "radii", Of.SPHERE, 1  # mm
     ANGLES = "angles", Of.FRAME, 1  # radians
-    RUNOUT = "runout", Of.FRAME, 2  # across the axis, mm
+    # Of the base beside its angle, about two directions across the axis through the origin,
+    # radians; then a shift along these and along the axis, mm.
+    TURN = "turn", Of.FRAME, 2
+    SHIFT = "shift", Of.FRAME, 3
+    # By which the spheres' sag is larger than the mean's, as a share.
+    SAG = "sag", Of.MACHINE, 1
 
 
 @dataclass(frozen=True)
 class Prior:
     """What is known of a machine before it is photographed: means, and standard deviations."""
 
-    mean: Machine  # the machine, without shift
+    mean: Machine
     # number of the series that each frame belongs to, each with an offset of its angles of its own,
     # (f,)
     series: Ints
@@ -100,6 +105,11 @@ class Prior:
     def across(self) -> Floats:
         """Two directions across the axis, (2, 3)."""
         return perpendicular_axes(self.mean.axis)
+
+    @cached_property
+    def ways(self) -> Floats:
+        """Directions that frames are shifted along: two across the axis, and the axis, (3, 3)."""
+        return np.vstack([self.across, self.mean.axis])
 
     def is_of(self, what: Of) -> Bools:
         """Whether free parameters are of single frames, spheres ..., (q,)."""
@@ -145,8 +155,14 @@ class Prior:
             centre=tilt.apply((1 + growth) * mean.centre + slide * mean.axis + x[Block.CENTRES]),
             radius=mean.radius + x[Block.RADII],
             leds=mean.leds + x[Block.LEDS],
-            shift=x[Block.RUNOUT] @ self.across,
+            turn=_sum(mean.turn, x[Block.TURN] @ self.across),
+            shift=_sum(mean.shift, x[Block.SHIFT] @ self.ways),
+            sag=None if mean.sag is None else (1 + x[Block.SAG][0]) * mean.sag,
         )
+
+
+def _sum(mean: Floats | None, more: Floats) -> Floats:
+    return more if mean is None else mean + more
 
 
 def prior_of(machine: Machine, series: Ints, known: Mapping[Block, ArrayLike]) -> Prior:
@@ -192,29 +208,41 @@ def sphere_slopes(
     prior: Prior, values: Floats, machine: Machine, frame: Ints, sphere: Ints
 ) -> Slopes:
     """Derivatives of spheres' centres in frames, (n, 3), by what moves them."""
-    angle = machine.angle[frame]
-    arm = machine.centre[sphere] - machine.axis_point
-    turned = rotated(arm, machine.axis, angle)
-    rotation = _matrices(machine.axis, angle)
+    angle, centre = machine.angle[frame], machine.centre[sphere]
+    sag = np.zeros_like(centre) if prior.mean.sag is None else prior.mean.sag[frame, sphere]
+    still = (
+        machine.axis_point
+        if machine.sag is None
+        else (machine.axis_point - machine.sag[frame, sphere])
+    )
+    turned = rotated(centre - still, machine.axis, angle)
+    turn = np.zeros_like(centre) if machine.turn is None else machine.turn[frame]
+    wobble = Rotation.from_rotvec(turn)
+    rotation = wobble.as_matrix() @ _matrices(machine.axis, angle)
     tilt = prior.tilt(values)
     on_base = rotation @ tilt.as_matrix()
-    along = np.broadcast_to(prior.mean.axis, arm.shape)
-    about = np.cross(machine.axis, turned)[..., None]
+    along = np.broadcast_to(prior.mean.axis, centre.shape)
+    about = wobble.apply(np.cross(machine.axis, turned))[..., None]
     tilts = (left_jacobian(tilt.as_rotvec()) @ prior.across.T).T
-    # A sphere c is tilted along, so of its arm c - p only the axis's point p is not.
+    # A sphere c is tilted along, so of its arm only the axis's point and its sag are not.
     by_tilt = [
-        np.cross(one, turned) + (rotation @ np.cross(one, machine.axis_point)) for one in tilts
+        wobble.apply(np.cross(one, turned)) + (rotation @ np.cross(one, still)[..., None])[..., 0]
+        for one in tilts
     ]
+    placed = wobble.apply(machine.axis_point + turned)
+    turns = (left_jacobian(turn) @ prior.across.T).swapaxes(1, 2)
     return Slopes(
         {Of.FRAME: frame, Of.SPHERE: sphere, Of.SERIES: prior.series[frame]},
         {
             Block.CARRIER: on_base @ np.stack([prior.mean.centre[sphere], along], axis=2),
             Block.CENTRES: on_base,
             Block.TILT: np.stack(by_tilt, axis=2),
-            Block.AXIS_POINT: (np.eye(3) - rotation) @ prior.across.T,
+            Block.AXIS_POINT: (wobble.as_matrix() - rotation) @ prior.across.T,
             Block.OFFSET: about,
             Block.ANGLES: about,
-            Block.RUNOUT: np.broadcast_to(prior.across.T, (len(frame), 3, 2)),
+            Block.TURN: np.cross(turns, placed[:, None]).swapaxes(1, 2),
+            Block.SHIFT: np.broadcast_to(prior.ways.T, (len(frame), 3, 3)),
+            Block.SAG: (rotation @ sag[..., None]),
         },
     )
 
@@ -222,7 +250,8 @@ def sphere_slopes(
 def base_slopes(prior: Prior, values: Floats) -> Slopes:
     """Derivatives of spheres' centres at base angle zero and radii, (k, 4), by what moves them."""
     machine = prior.machine(values)
-    still, every = replace(machine, angle=0 * machine.angle), np.arange(len(machine.radius))
+    still = replace(machine, angle=0 * machine.angle, turn=None, sag=None)
+    every = np.arange(len(machine.radius))
     moved = sphere_slopes(prior, values, still, 0 * every, every)
     by = {
         block: np.pad(moved.by[block], ((0, 0), (0, 1), (0, 0)))
@@ -251,12 +280,13 @@ def _matrices(axis: Floats, angle: Floats) -> Floats:
 
 
 def left_jacobian(turn: Floats) -> Floats:
-    """Small rotation by which exp(turn) changes, by turn, (3, 3) (Sola et al. 2018, eq. 145)."""
-    angle = float(np.linalg.norm(turn))
-    x, y, z = turn
-    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    if angle < SMALL:
-        return np.eye(3) + skew / 2
-    second = (1 - np.cos(angle)) / angle**2
-    third = (angle - np.sin(angle)) / angle**3
+    """Small rotations by which exp(turn) changes, by turns (..., 3), (..., 3, 3).
+
+    Sola et al. 2018, eq. 145.
+    """
+    angle = norm(turn)[..., None, None]
+    skew = np.cross(np.eye(3), turn[..., None, :])
+    some = np.where(angle < SMALL, 1.0, angle)
+    second = np.where(angle < SMALL, 0.5, (1 - np.cos(some)) / some**2)
+    third = np.where(angle < SMALL, 1 / 6, (some - np.sin(some)) / some**3)
     return np.asarray(np.eye(3) + second * skew + third * skew @ skew)

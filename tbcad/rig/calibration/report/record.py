@@ -59,7 +59,9 @@ def angles_table(result: MachineCalibration) -> Table:
     machine, frames = found.machine, result.setup.frames
     angle = np.degrees(machine.angle)
     h = found.highlights
-    shift = np.zeros((len(frames), 3)) if machine.shift is None else machine.shift
+    none = np.zeros((len(frames), 3))
+    turn = 1000 * (none if machine.turn is None else machine.turn)
+    shift = none if machine.shift is None else machine.shift
     columns: dict[str, ArrayLike] = {
         "object_turn_deg": [frame.object_turn_deg for frame in frames],
         "stop": [frame.stop for frame in frames],
@@ -68,8 +70,10 @@ def angles_table(result: MachineCalibration) -> Table:
         "estimated_deg": angle,
         "difference_deg": angle - planned,
         "sigma_deg": np.degrees(angle_sigmas(found)),
+        **{f"turn_{axis}_mrad": turn[:, i] for i, axis in enumerate(AXES)},
+        "sigma_turn_mrad": 1000 * _frame_sigmas(found, Block.TURN),
         **{f"shift_{axis}_mm": shift[:, i] for i, axis in enumerate(AXES)},
-        "sigma_shift_mm": _runout_sigmas(found),
+        "sigma_shift_mm": _frame_sigmas(found, Block.SHIFT),
     }
     return Table.of_columns("angles", columns)
 
@@ -121,11 +125,11 @@ def angle_sigmas(found: Estimate) -> Floats:
     return np.asarray(np.sqrt(both[:, 0, 0]))
 
 
-def _runout_sigmas(found: Estimate) -> Floats:
-    """Root mean square of each frame's shift, mm, (f,)."""
-    each = np.broadcast_to(np.eye(2), (len(found.prior.series), 2, 2))
-    shift = found.covariances(Slopes(_of_frames(found), {Block.RUNOUT: each}))
-    return np.asarray(np.sqrt(np.trace(shift, axis1=1, axis2=2)))
+def _frame_sigmas(found: Estimate, block: Block) -> Floats:
+    """Standard deviation of a block's vector in each frame, (f,)."""
+    each = np.broadcast_to(np.eye(block.size), (len(found.prior.series), block.size, block.size))
+    known = found.covariances(Slopes(_of_frames(found), {block: each}))
+    return np.asarray(np.sqrt(np.trace(known, axis1=1, axis2=2)))
 
 
 def _of_frames(found: Estimate) -> dict[Of, Ints]:

@@ -5,14 +5,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import csr_array, eye_array
+from scipy.sparse import kron as kron_array
 from scipy.spatial.transform import Rotation
 
 from tbcad.common.results import Table
-from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.rig.calibration.calibrate import MachineCalibration
-from tbcad.rig.calibration.estimate.parameters import Block, Of, Slopes, base_slopes
+from tbcad.rig.calibration.estimate.parameters import (
+    Block,
+    base_slopes,
+    covariances,
+    sphere_slopes,
+)
 from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.calibration.report.record import angle_sigmas
 from tbcad.rig.calibration.uncertainty import FIGURES, motion_fit, shared_motions
@@ -68,9 +74,9 @@ def recovered_errors(result: MachineCalibration, truth: Machine) -> tuple[Kind, 
         ),
         ("axis", "mrad", MILLI, lambda one: one.axis @ prior.across.T, of[Block.TILT]),
         (
-            *("base in each frame", "um", MICROMETRES),
-            lambda one: _base_places(one, prior.across),
-            _place_sigmas(result),
+            *("balls' middle in each frame", "um", MICROMETRES),
+            _middles,
+            _middle_sigmas(result.found),
         ),
         ("camera's place", "um", MICROMETRES, lambda one: one.camera.pinhole, of[Block.PINHOLE]),
         (
@@ -121,23 +127,26 @@ def _besides_motion(centre: Floats) -> Floats:
     return np.asarray(np.eye(place.size) - basis @ basis.T)
 
 
-def _base_places(machine: Machine, across: Floats) -> Floats:
-    """Where the base's origin goes in each frame, across the axis, mm, (f, 2)."""
-    point = np.broadcast_to(machine.axis_point, (len(machine.angle), 3))
-    turned = rotated(point, machine.axis, machine.angle)
-    shift = 0.0 if machine.shift is None else machine.shift
-    return np.asarray((point - turned + shift) @ across.T)
+def _pairs(machine: Machine) -> tuple[Ints, Ints]:
+    """Numbers of frame and sphere of all spheres in all frames, frame by frame, (f k,)."""
+    frames, spheres = len(machine.angle), len(machine.radius)
+    return np.repeat(np.arange(frames), spheres), np.tile(np.arange(spheres), frames)
 
 
-def _place_sigmas(result: MachineCalibration) -> Floats:
-    """Of what `_base_places` gives, by the point of the axis and its run-out, mm, (f, 2)."""
-    prior, angle = result.found.prior, result.found.machine.angle
-    ways = [np.broadcast_to(one, (len(angle), 3)) for one in prior.across]
-    turned = np.stack([rotated(one, prior.mean.axis, angle) for one in ways], axis=2)
-    by_point = np.eye(2) - prior.across @ turned
-    by = {Block.AXIS_POINT: by_point, Block.RUNOUT: np.broadcast_to(np.eye(2), by_point.shape)}
-    covariance = result.found.covariances(Slopes({Of.FRAME: np.arange(len(angle))}, by))
-    return np.asarray(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
+def _middles(machine: Machine) -> Floats:
+    """Mean of the spheres' centres in each frame, mm, (f, 3)."""
+    centres = machine.centres(*_pairs(machine))
+    return np.asarray(centres.reshape(-1, len(machine.radius), 3).mean(axis=1))
+
+
+def _middle_sigmas(found: Estimate) -> Floats:
+    """Of what `_middles` gives, mm, (f, 3)."""
+    machine, spheres = found.machine, len(found.machine.radius)
+    slopes = sphere_slopes(found.prior, found.values, machine, *_pairs(machine))
+    mean = kron_array(eye_array(len(machine.angle)), np.full((1, spheres), 1 / spheres))
+    by = kron_array(mean, eye_array(3)) @ slopes.matrix(found.prior)
+    known = covariances(found.covariance, csr_array(by), 3)
+    return np.asarray(np.sqrt(np.diagonal(known, axis1=1, axis2=2)))
 
 
 def _lens(machine: Machine) -> Floats:

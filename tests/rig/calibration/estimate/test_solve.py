@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 from scipy.stats import chi2
 
 from tbcad.common.results import study_files
+from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, perpendicular_axes, unit
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.reflection import reflection_points
@@ -47,7 +48,7 @@ from tbcad.rig.calibration.uncertainty import (
     ray_slopes,
     rigid_motions,
 )
-from tbcad.rig.machine.designed import designed_shell, read_leds
+from tbcad.rig.machine.designed import designed_shell, read_leds, sag_motion
 from tbcad.rig.machine.machine import Highlights, Machine
 from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.rig.calibration.machines import (
@@ -67,7 +68,8 @@ MACHINE = small_machine()
 BALLS = len(MACHINE.radius)
 ERRORS = process_errors(load_process("fdm"))
 CAP, ARM = 2, 9.0
-BODY = MACHINE.centre + np.where(np.arange(BALLS)[:, None] == CAP, [ARM, 0, 0], 0.0)
+ARMS = np.where(np.arange(BALLS) == CAP, ARM, 0.0)
+NONE = np.zeros((len(MACHINE.angle), BALLS, 3))
 SERIES = np.repeat([0, 1], len(MACHINE.angle) // 2)
 UNIFORM = np.sqrt(3)
 
@@ -217,7 +219,8 @@ def test_every_case_has_figures(export: ExportedDesign) -> None:
 
 
 def of_prototype(**known: Any) -> Prior:
-    return prototype_prior(MACHINE, ERRORS, BODY, np.arange(BALLS) == CAP, SERIES, 0.01, **known)
+    still = [sag_motion(MACHINE, NONE)]
+    return prototype_prior(MACHINE, still, ERRORS, ARMS, SERIES, 0.01, **known)
 
 
 def test_figures_are_those_of_the_process() -> None:
@@ -230,9 +233,24 @@ def test_figures_are_those_of_the_process() -> None:
     assert sigma[Block.ANGLES] == pytest.approx(
         np.full(len(MACHINE.angle), ERRORS.rotation_angle.spread)
     )
-    assert sigma[Block.RUNOUT].shape == (len(MACHINE.angle), 2)
+    assert sigma[Block.SHIFT] == pytest.approx(np.full((len(MACHINE.angle), 3), 0.01))
+    assert sigma[Block.TURN] == pytest.approx(ERRORS.axis_wobble.spread * np.ones((24, 2)))
+    assert (sigma[Block.SAG] == 0.25).all()
     expected = np.hypot(0.01 / UNIFORM, ERRORS.rotation_angle.spread)
     assert sigma[Block.OFFSET] == pytest.approx(np.full(2, expected))
+
+
+def test_weight_moves_frames_as_it_is_expected_to_and_by_as_much_as_that_may_be_off() -> None:
+    """The motion and what is left put every ball where its weight does."""
+    bends = 0.01 * np.random.default_rng(2).standard_normal((2, *NONE.shape))
+    prior = prototype_prior(
+        MACHINE, [sag_motion(MACHINE, one) for one in bends], ERRORS, ARMS, SERIES
+    )
+    frame, sphere = np.repeat(np.arange(24), BALLS), np.tile(np.arange(BALLS), 24)
+    moved = prior.mean.centres(frame, sphere) - MACHINE.centres(frame, sphere)
+    expected = rotated(bends.sum(axis=0)[frame, sphere], MACHINE.axis, MACHINE.angle[frame])
+    assert moved == pytest.approx(expected, abs=3e-5)  # turns of 0.5 mrad to first order
+    assert prior.sigma[Block.SHIFT][0, 0] > of_prototype().sigma[Block.SHIFT][0, 0]
 
 
 def test_a_measured_radius_replaces_the_drawing() -> None:

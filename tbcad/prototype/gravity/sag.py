@@ -1,12 +1,12 @@
-"""Where the balls of a build are as its base turns in the field of gravity.
+"""Where the balls of a prototype are as its base turns in the field of gravity: sag.csv.
 
-Carrier and bearing head are linear elastic solids, as prototype.glb has them; the shaft is a beam
-on two bearings, the uprights are columns. All else is rigid: bearings, screwed joints, plate, feet.
-The frame here is the base's at angle zero: x along the axis w, y at azimuth zero.
+Carrier and bearing head are linear elastic solids, as they are written; the shaft is a beam on two
+bearings, the uprights are columns. All else is rigid: bearings, screwed joints, plate, feet. The
+frame here is the base's at angle zero: x along the axis w, y at azimuth zero.
 """
 
 import math
-import struct
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,15 +15,15 @@ import numpy as np
 from trimesh import Trimesh
 from trimesh.util import concatenate
 
-from tbcad.cad.formats.glb import read_glb
+from tbcad.cad.formats.checked_files import Row, write_table
+from tbcad.cad.formats.glb import ColouredMesh
 from tbcad.core.geometry.rotations import rotated_about_x
 from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.reflector import ExportedDesign
-from tbcad.output.manifest import read_manifest, written_file
-from tbcad.records.prototype import NAME, Prototype
-from tbcad.records.tables import BallRow, StopRow
-from tbcad.rig.gravity.compliance import (
+from tbcad.prototype.arrangement import PrototypeModel
+from tbcad.prototype.drive.balance import ball_masses
+from tbcad.prototype.fasteners import Fastener
+from tbcad.prototype.gravity.compliance import (
     N_PER_G,
     Axle,
     Bodies,
@@ -36,6 +36,8 @@ from tbcad.rig.gravity.compliance import (
     shaft_compliance,
     turned_to,
 )
+from tbcad.records.prototype import NAME, Prototype
+from tbcad.records.tables import BallRow, SagRow, StopRow
 from tbcad.types import Floats
 
 STEEL, ALUMINIUM, ALUMINIUM_SHEAR = 210.0, 70.0, 26.0  # moduli, GPa
@@ -46,10 +48,12 @@ SECOND_MOMENT, TWIST_CONSTANT = 7.0e3, 1.5e3
 SCREW_MM, REACH_MM = 5.0, 10.0
 MPA_PER_GPA = 1e3
 UPRIGHTS, BEARINGS = ("upright_left", "upright_right"), ("bearing_front", "bearing_rear")
-MAX_MM = 5000.0  # of a body: none that a build has is as long
 X = np.array([1.0, 0.0, 0.0])
 LEFT = {"turn and run-out": [3, 1, 2], "six freedoms": [0, 1, 2, 3, 4, 5]}
 """Freedoms of `Sag.unmodelled` that a calibration may give to each stop."""
+
+
+PARTS = ("carrier", "head", "shaft", "uprights")  # that bend
 
 
 @dataclass(frozen=True)
@@ -59,8 +63,13 @@ class Sag:
     angle: Floats  # of the base at each stop, radians, (s,)
     centre: Floats  # of the bodies without weight, in the base's frame, mm, (k, 3)
     axes: Floats  # of that frame at angle zero in the shell's, as rows, (3, 3)
-    gravity: Floats  # direction of gravity at each stop, (s, 3)
-    of: dict[str, Floats]  # by what bends: carrier, head, shaft, uprights, (s, k, 3)
+    of: dict[str, Floats]  # by what bends, one of PARTS, (s, k, 3)
+
+    @property
+    def gravity(self) -> Floats:
+        """Direction of gravity at each stop, (s, 3)."""
+        down = np.broadcast_to(-self.axes[:, 2], (len(self.angle), 3))
+        return rotated_about_x(down, -self.angle)
 
     @property
     def whole(self) -> Floats:
@@ -110,83 +119,115 @@ class Sag:
             ),
         ]
 
+    def rows(self) -> Iterable[Row]:
+        """Rows of sag.csv: displacements in the frame of the shell."""
+        turned = [rotated_about_x(self.of[part], self.angle[:, None]) for part in PARTS]
+        moved = np.concatenate([one @ self.axes for one in turned], axis=2)
+        for stop, balls in enumerate((moved + 0.0).tolist(), 1):
+            for ball, cells in enumerate(balls, 1):
+                yield dict(zip(SagRow.columns(), (stop, ball, *cells), strict=True))
 
-def build_sag(export: ExportedDesign) -> Sag:
-    """The sag of a build's prototype, by the modulus and the infill of its spec's printer.
 
-    InputError: there is no prototype, its files cannot be read, or its drive has no shaft of its
-    own.
+def read_sag(folder: Path) -> Sag | None:
+    """The sag that a build has in sag.csv; None where it was not worked out.
+
+    InputError: a file of the prototype is missing, cannot be read, or is of another prototype.
     """
-    folder, printer = export.folder, export.spec.printer
     record = Prototype.read(folder / NAME)
-    if "shaft" not in {body.name for body in record.bought}:
+    if not (folder / SagRow.FILE).is_file():
+        return None
+    balls, stops, rows = BallRow.read(folder), StopRow.read(folder), SagRow.read(folder)
+    shape = len(stops), len(balls)
+    if [(row.stop, row.ball) for row in rows] != [(s + 1, k + 1) for s, k in np.ndindex(shape)]:
         raise InputError(
-            f"{folder / NAME}: the base turns on the drive's own bearings, whose stiffness no list "
-            'gives: sag is computed for prototype.base.drive = "nema17-belt"'
+            f"{folder / SagRow.FILE} has not a row for each of {shape[0]} stops and {shape[1]} "
+            "balls, in order: build the export again"
         )
-    manifest = read_manifest(folder)
-    for name in (record.assembly.glb, BallRow.FILE, StopRow.FILE):
-        written_file(folder, manifest, name, Prototype.MISSING)
+    angle = np.radians([row.base_angle_deg for row in stops])
     axes = np.array([record.frame.axis, record.frame.zero, record.frame.third])
-    carrier_parts = [one.name for one in record.with_role("base") if one.name != "zero_disc"]
-    solids = read_solids(folder / record.assembly.glb, axes, carrier_parts)
-    bodies = _bodies(BallRow.read(folder), axes, printer.density_g_cm3)
-    angle, down = np.radians([row.base_angle_deg for row in StopRow.read(folder)]), -axes[:, 2]
-    gravity = rotated_about_x(np.broadcast_to(down, (len(angle), 3)), -angle)
-    material = Material(printer.modulus_gpa, printer.density_g_cm3, printer.infill)
-    pieces = [solids[name] for name in carrier_parts]
-    held = Axle(X * pieces[0].bounds[0, 0], X * solids["shaft"].bounds[1, 0], _shaft_radius(solids))
-    carrier = sag_of_bodies(concatenate(pieces), bodies, held, material)
-    load = axes @ np.array(record.drive.centre_mm), record.drive.mass_g
-    of = {"carrier": np.einsum("kag,sg->ska", carrier, gravity)}
-    for name, flexible in _holding(record, solids, axes, held.start, material).items():
-        of[name] = moved_by(flexible, held.start, bodies.centre, load, (angle, down))
-    return Sag(angle, bodies.centre, axes, gravity, of)
-
-
-def read_solids(path: Path, axes: Floats, carrier: list[str]) -> dict[str, Trimesh]:
-    """All bodies of an assembly by name, in the frame with some axes as rows.
-
-    InputError: it is no assembly, lacks a body, or is far too large to be one.
-    """
-    try:
-        shown = {body.name: body.mesh for body in read_glb(path)}
-    except (LookupError, ValueError, TypeError, AttributeError, OSError, struct.error):
-        raise InputError(f"{path} cannot be read: build the export again") from None
-    solids = {n: Trimesh(one.vertices @ axes.T, one.triangles) for n, one in shown.items()}
-    missing = {*carrier, "shaft", "bearing_head", *UPRIGHTS, *BEARINGS} - solids.keys()
-    if missing or max(np.ptp(one.bounds, axis=0).max() for one in solids.values()) > MAX_MM:
-        raise InputError(f"{path} is no assembly that tbcad wrote: build the export again")
-    return solids
-
-
-def _bodies(balls: list[BallRow], axes: Floats, density: float) -> Bodies:
-    """Balls and caps: nodes about as far as a seat reaches move with each."""
+    moved = np.array([[getattr(row, one) for one in SagRow.columns()[2:]] for row in rows])
+    parts = moved.reshape(*shape, len(PARTS), 3).transpose(2, 0, 1, 3) @ axes.T
+    turned = rotated_about_x(parts, -angle[:, None])
     centre = np.array([[ball.bx, ball.by, ball.bz] for ball in balls]) @ axes.T
-    radius = np.array([ball.body_radius_mm for ball in balls])
-    printed = 4 / 3 * np.pi * radius**3 / 1000 * density
-    mass = np.array([math.nan if ball.mass_g is None else ball.mass_g for ball in balls])
-    return Bodies(centre, radius, np.where(np.isnan(mass), printed, mass))
+    return Sag(angle, centre, axes, dict(zip(PARTS, turned, strict=True)))
+
+
+@dataclass(frozen=True)
+class WeighedBase:
+    """What a base, its weight and what holds it are, in the base's frame at angle zero."""
+
+    axes: Floats  # of that frame in the shell's, as rows, (3, 3)
+    angle: Floats  # of the base at each stop, radians, (s,)
+    bodies: Bodies
+    carrier: list[Trimesh]  # its pieces, the one with the hub first
+    load: tuple[Floats, float]  # centre of gravity of all that turns, mm, (3,), and mass, g
+    solids: dict[str, Trimesh]  # bearing head, shaft, bearings and uprights
+    screws: list[Axle]  # that hold the head on the uprights
+    material: Material  # of carrier and head
+
+
+def weighed_base(built: PrototypeModel, meshes: list[ColouredMesh]) -> WeighedBase | None:
+    """Of a prototype with meshes of its bodies; None with a drive that has no shaft of its own.
+
+    No list says how stiff the bearings of a rotary stage are.
+    """
+    layout, printer, balance = built.layout, built.spec.printer, built.balance
+    axes, balls = balance.frame, ball_masses(built.layout, built.spec.printer.density_g_cm3)
+    shown = {one.name: one.mesh for one in meshes}
+    carrier = [p.name for p in built.printed if p.role == "base" and p.name != "zero_disc"]
+    if "shaft" not in shown:
+        return None
+    solids = {
+        name: Trimesh(shown[name].vertices @ axes.T, shown[name].triangles)
+        for name in (*carrier, "shaft", "bearing_head", *UPRIGHTS, *BEARINGS)
+    }
+    return WeighedBase(
+        axes=axes,
+        angle=layout.stops.angle,
+        bodies=Bodies(balls.centre @ axes.T, layout.balls.body_radius, balls.mass_g),
+        carrier=[solids[name] for name in carrier],
+        load=(axes @ balance.centre, balance.mass_g),
+        solids=solids,
+        screws=_screws(built.fasteners, axes),
+        material=Material(printer.modulus_gpa, printer.density_g_cm3, printer.infill),
+    )
+
+
+def write_sag(folder: Path, base: WeighedBase) -> None:
+    """Write sag.csv."""
+    write_table(folder / SagRow.FILE, SagRow.columns(), list(sag_of(base).rows()))
+
+
+def sag_of(base: WeighedBase) -> Sag:
+    """The sag of the balls of a base."""
+    hub, shaft = base.carrier[0].bounds[0, 0], base.solids["shaft"]
+    held = Axle(X * hub, X * shaft.bounds[1, 0], _shaft_radius(base.solids))
+    carrier = sag_of_bodies(concatenate(base.carrier), base.bodies, held, base.material)
+    sag = Sag(base.angle, base.bodies.centre, base.axes, {})
+    of = {"carrier": np.einsum("kag,sg->ska", carrier, sag.gravity)}
+    turns = base.angle, -base.axes[:, 2]
+    for name, flexible in _holding(base, held.start).items():
+        of[name] = moved_by(flexible, held.start, base.bodies.centre, base.load, turns)
+    return Sag(base.angle, base.bodies.centre, base.axes, of)
 
 
 def _shaft_radius(solids: dict[str, Trimesh]) -> float:
     return float(np.ptp(solids["shaft"].bounds[:, 1]) / 2)
 
 
-def _holding(
-    record: Prototype, solids: dict[str, Trimesh], axes: Floats, hub: Floats, material: Material
-) -> dict[str, Floats]:
+def _holding(base: WeighedBase, hub: Floats) -> dict[str, Floats]:
     """Compliances at the hub of head, shaft and uprights, (6, 6) each, in the base's frame."""
+    solids = base.solids
     middle = {name: solids[name].bounds[:, 0].mean() for name in BEARINGS}
     front, rear = (X * middle[name] for name in BEARINGS)
     inertia = math.pi / 4 * _shaft_radius(solids) ** 4
     shaft = shaft_compliance(hub[0] - front[0], front[0] - rear[0], STEEL * MPA_PER_GPA * inertia)
     loaded = [_round(solids[name]) for name in BEARINGS]
-    head = compliance(solids["bearing_head"], front, _screws(record, axes), loaded, material)
+    head = compliance(solids["bearing_head"], front, base.screws, loaded, base.material)
     return {
         "head": moved_to(head, hub - front),
         "shaft": shaft,
-        "uprights": _uprights(solids, axes, hub),
+        "uprights": _uprights(solids, base.axes, hub),
     }
 
 
@@ -196,11 +237,11 @@ def _round(bearing: Trimesh) -> Axle:
     return Axle(X * low[0], X * high[0], float(high[1]))
 
 
-def _screws(record: Prototype, axes: Floats) -> list[Axle]:
+def _screws(fasteners: Iterable[Fastener], axes: Floats) -> list[Axle]:
     """Round the screws that hold the head on the uprights."""
-    held = [one for one in record.fasteners if "bearing_head" in one.through]
+    held = [one for one in fasteners if "bearing_head" in one.through]
     held = [one for one in held if not set(UPRIGHTS).isdisjoint(one.through)]
-    places = [(axes @ np.array(one.position_mm), axes @ np.array(one.along)) for one in held]
+    places = [(axes @ one.place, axes @ one.along) for one in held]
     return [Axle(at - REACH_MM * along, at + REACH_MM * along, SCREW_MM) for at, along in places]
 
 

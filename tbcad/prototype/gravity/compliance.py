@@ -6,10 +6,11 @@ import numpy as np
 from trimesh import Trimesh
 
 from tbcad.core.geometry.vectors import norm
-from tbcad.rig.gravity.elastic import Cells, fill_cells, hold
+from tbcad.prototype.drive.balance import GRAVITY
+from tbcad.prototype.gravity.elastic import Cells, fill_cells, hold
 from tbcad.types import Bools, Floats, Ints
 
-N_PER_G = 9.80665e-3  # weight of a gram, newtons
+N_PER_G = GRAVITY * 1e-3  # weight of a gram, newtons
 CELL_MM = 5.0
 
 

@@ -1,0 +1,54 @@
+"""What gravity does to a prototype at its stops, as its build worked it out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tbcad.cad.formats.checked_files import REBUILD
+from tbcad.errors import InputError
+from tbcad.light.simulate.prototype.run import Plan
+from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.prototype.gravity.sag import read_sag
+from tbcad.records.tables import StopRow
+from tbcad.types import Floats
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """Turn of the base and displacements of its k balls at t stops."""
+
+    wind_up: Floats  # by which the base is beyond the plan's angles, radians, (t,)
+    # displacements of balls in the base's frame at angle zero: as the carrier bends, and as what
+    # holds its hub does, mm, (2, t, k, 3)
+    sag: Floats
+
+    def sagged(self, share: Floats) -> Floats:
+        """Displacements with shares (..., 2) of both, mm, (..., t, k, 3)."""
+        return np.tensordot(share, self.sag, axes=(-1, 0))
+
+
+def weightless(plan: Plan) -> Gravity:
+    """Without gravity."""
+    stops = len(plan.angle)
+    return Gravity(np.zeros(stops), np.zeros((2, stops, len(plan), 3)))
+
+
+def read_gravity(export: ExportedDesign, plan: Plan) -> Gravity:
+    """What gravity does at the stops of a plan; displacements are zero where none are known.
+
+    Motor and belt yield to the base's weight: see tbcad.prototype.drive.drive; carrier and frame
+    bend: see tbcad.prototype.gravity. InputError if a file is missing, malformed, or of another
+    plan.
+    """
+    path, none = export.folder / StopRow.FILE, weightless(plan)
+    rows = StopRow.read(export.folder)
+    if [row.stop for row in rows] != list(range(1, len(plan.angle) + 1)):
+        raise InputError(
+            f"{path}: stops are not those of the plan, 1 to {len(plan.angle)}: {REBUILD}"
+        )
+    wind_up = np.radians([row.wind_up_deg for row in rows])
+    found = read_sag(export.folder)
+    if found is None:
+        return Gravity(wind_up, none.sag)
+    carrier = found.of["carrier"]
+    return Gravity(wind_up, np.stack([carrier, found.whole - carrier]) @ found.axes)

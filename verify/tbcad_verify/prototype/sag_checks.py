@@ -1,0 +1,119 @@
+"""What weight does to the carrier: how far the balls move besides what a calibration finds.
+
+A calibration finds a motion of the whole base for each stop, and where the balls are on it. What is
+left is the change of the carrier's shape from stop to stop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from tbcad_verify.mesh.mesh import join_meshes
+from tbcad_verify.prototype.assembly import Shape
+from tbcad_verify.prototype.bodies import MeasuredPrototype
+from tbcad_verify.prototype.bricks import STEP_MM, Bricks, fill_bricks, shapes
+from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
+from tbcad_verify.report.checks import Check, CheckName, at_most, require
+from tbcad_verify.types import Floats
+
+FILE = "sag.csv"
+CHECKS = {"sag left": "mm", "sag as written": "%"}
+LEFT_MM = 0.1  # half of a pixel of the light field at the object, by which a ray may be off
+# Printed moduli are known to a quarter; two models of one part differ by a tenth to a quarter.
+OFF_PERCENT = 40.0
+RIGID_MM = 1e-6  # of what bends below the carrier, which moves all balls as one
+G_MM = 9.80665e-3  # weight of a gram, newtons
+SHAFT, ZERO_DISC = "shaft", "zero_disc"
+
+
+def checks(
+    names: list[CheckName],
+    context: PrototypeContext,
+    parts: list[MeasuredPart],
+    measured: MeasuredPrototype,
+    drawn: Mapping[str, Shape],
+) -> list[Check]:
+    """What is left of the carrier's sag after six freedoms at each stop, and that of the file.
+
+    None with a drive that has no shaft of its own. Unknown: there is no sag.csv, or not of these
+    stops and balls.
+    """
+    if SHAFT not in drawn:
+        return []
+    table = require(context.prototype.sag, "the export has no sag.csv")
+    turn = context.base_rotation(np.radians(context.prototype.stops.angle)).as_matrix()
+    down = np.array([0.0, 0.0, -1.0]) @ turn
+    own = np.einsum("kab,sb->ska", _by_weight(context, parts, measured, drawn), down)
+    told = require(table.moved(own.shape), "sag.csv has other stops or balls")
+    told = np.einsum("sba,pskb->pska", turn, told)
+    left = np.linalg.norm(_without_motions(own - own.mean(axis=0), measured.body.T), axis=2)
+    stop, ball = np.unravel_index(left.argmax(), left.shape)
+    off = 100 * float(np.linalg.norm(told[0] - own) / np.linalg.norm(own))
+    bent = float(np.abs(_without_motions(told[1:].sum(axis=0), measured.body.T)).max())
+    detail = f"root mean square {1000 * np.sqrt((own**2).sum(axis=2).mean()):.0f} um"
+    if bent > RIGID_MM:
+        off, detail = np.inf, f"head, shaft and uprights bend the base by {1000 * bent:.3g} um"
+    return [
+        at_most(names[0], float(left.max()), LEFT_MM, f"ball {ball + 1} at stop {stop + 1}"),
+        at_most(names[1], off, OFF_PERCENT, detail),
+    ]
+
+
+def _by_weight(
+    context: PrototypeContext,
+    parts: list[MeasuredPart],
+    measured: MeasuredPrototype,
+    drawn: Mapping[str, Shape],
+) -> Floats:
+    """(K, 3, 3) displacements of the balls at angle zero, mm, by one g along x, y, z: last axis."""
+    printer, axis = context.export.spec.printer, context.frame[0]
+    carrier = [one for one in of_roles(parts, "base") if one.part.name != ZERO_DISC]
+    mesh = join_meshes([one.placed_mesh for one in carrier])
+    bricks = fill_bricks(mesh, printer.infill)
+    shaft = drawn[SHAFT][0]
+    along = bricks.place @ axis
+    out = np.linalg.norm(bricks.place - along[..., None] * axis, axis=2)
+    reach = np.linalg.norm(shaft - (shaft @ axis)[:, None] * axis, axis=1).max() + STEP_MM
+    held = (bricks.share > 0) & (out < reach) & (along < (shaft @ axis).max() + STEP_MM)
+    weight = bricks.spread(bricks.share * STEP_MM**3 * printer.density_g_cm3 * 1e-3)
+    near = _near(bricks, measured)
+    for mass, one in zip(context.masses_g, near, strict=True):
+        weight = weight + bricks.spread(one / one.sum()) * mass
+    load = weight[:, None, None] * G_MM * np.eye(3)
+    moved = bricks.solve(held, load) / (printer.modulus_gpa * 1e3)
+    centres = zip(measured.body.T, near, strict=True)
+    return np.stack([_shift(bricks, moved, *pair) for pair in centres])
+
+
+def _near(bricks: Bricks, measured: MeasuredPrototype) -> list[Floats]:
+    """Material that carries each ball, K of (c, q)."""
+    spheres = zip(measured.body.T, measured.body_radius, strict=True)
+    return [
+        bricks.share * (np.linalg.norm(bricks.place - centre, axis=2) < radius + STEP_MM)
+        for centre, radius in spheres
+    ]
+
+
+def _shift(bricks: Bricks, moved: Floats, centre: Floats, near: Floats) -> Floats:
+    """(3, 3) of a centre as material near it is moved, by the best rigid motion."""
+    cell, cube = np.nonzero(near)
+    there = np.einsum("mi,mikl->mkl", shapes()[cube], moved[bricks.node[cell]])
+    motion = _motions(bricks.place[cell, cube] - centre)
+    return np.asarray(np.linalg.lstsq(motion, there.reshape(-1, 3), rcond=None)[0][:3])
+
+
+def _motions(arm: Floats) -> Floats:
+    """(3 N, 6) what a shift and a turn about the origin do at (N, 3)."""
+    turns = np.cross(np.eye(3), arm[:, None]).transpose(0, 2, 1)
+    shifts = np.broadcast_to(np.eye(3), turns.shape)
+    return np.concatenate([shifts, turns], axis=2).reshape(-1, 6)
+
+
+def _without_motions(moved: Floats, centre: Floats) -> Floats:
+    """(S, K, 3) displacements of the balls (K, 3) less the best rigid motion of each stop."""
+    motion = _motions(centre)
+    flat = moved.reshape(len(moved), -1)
+    return np.asarray((flat - flat @ np.linalg.pinv(motion).T @ motion.T).reshape(moved.shape))
