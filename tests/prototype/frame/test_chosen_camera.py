@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from manifold3d import Manifold, OpType
-from tbcad.prototype.frame.layout import frame_layout
 
 from tbcad.cad.kernel.meshing import primitive_mesh
 from tbcad.core.camera.lists import CAMERA_COLUMNS, LENS_COLUMNS
@@ -15,6 +14,7 @@ from tbcad.core.geometry.primitives import Component
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
+from tbcad.prototype.arrangement import frame_layout
 from tbcad.prototype.frame.camera_mount import CameraMount, camera_mount
 from tbcad.prototype.frame.chosen_camera import chosen_camera, plate_face, with_camera
 from tbcad.prototype.light.lamp import LampLayout
