@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import nan
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -177,7 +176,7 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
                 verification(folder, progress=progress, cutter=cutter),
                 folder=out,
                 note=export.note,
-                as_made=_with_sag(simulated.result(), folder) if simulated else None,
+                as_made=simulated.result() if simulated else None,
             )
         progress("report")
         from tbcad.report.page.write import write_report
@@ -201,24 +200,6 @@ def _as_made(mirrors: MirrorDesign) -> AsMade:
     return as_made(reflectors(mirrors), mirrors.spec)
 
 
-def _with_sag(made: AsMade, folder: Path) -> AsMade:
-    """The same and how far a ball moves between two stops, where the build has a prototype.
-
-    Not a number where it is not known: of a rotary stage's own bearings, or of files that cannot be
-    read, of which the verification tells.
-    """
-    from tbcad.prototype.gravity.sag import read_sag
-    from tbcad.records.prototype import NAME
-
-    if not (folder / NAME).is_file():
-        return made
-    try:
-        sag = read_sag(folder)
-    except InputError:
-        sag = None
-    return replace(made, sag_mm=sag.between_stops(sag.whole) if sag else nan)
-
-
 def as_made(
     exports: Path | str, progress: Progress = silent, detail: Progress = silent
 ) -> AsMade | None:
@@ -237,7 +218,7 @@ def as_made(
         export = read_export(folder)
     except InputError:  # the verification says what is wrong with it
         return None
-    return _with_sag(simulated(export.reflectors, export.spec, detail), folder)
+    return simulated(export.reflectors, export.spec, detail)
 
 
 @keywords(ReportOptions)

@@ -29,7 +29,7 @@ from tests.verify.corpus.mutation import (
 
 RECORD, DESIGN, PROGRAM = "prototype.json", "design.json", "rotation_plan.nc"
 STEP, GLB = "prototype.step", "prototype.glb"
-BALLS, HOLES = "balls.csv", "plate_holes.csv"
+BALLS, HOLES, SAG = "balls.csv", "plate_holes.csv", "sag.csv"
 SETTINGS = "grbl_settings.txt"
 CAP, SHEET = "drawing_cap_1.dxf", "drawing_plate.pdf"
 PLATE, WHEEL, LAMP = (f"drawing_{name}.dxf" for name in ("plate", "wheel", "lamp"))
@@ -59,6 +59,12 @@ def table(name: str, how: Callable[[Rows], object]) -> Job:
 def row(name: str, number: int, **cells: object) -> Job:
     """Other cells in one row of a table."""
     return table(name, lambda rows: rows[number].update({k: str(v) for k, v in cells.items()}))
+
+
+def half_the_carriers(rows: Rows) -> None:
+    """Half of the carrier's sag, as of a stiffer material."""
+    for one in rows:
+        one.update({k: str(float(v) / 2) for k, v in one.items() if k.startswith("carrier")})
 
 
 def redrawn(name: str, how: Callable[[Any], object]) -> Job:
@@ -396,6 +402,14 @@ FAILING: Broken = {
             asked("frame/camera_axis_mm", 25.0),
             "the camera stands 22.50 mm from its axis",
         ),
+    },
+    ("sag left", SAG): {
+        "sag: a modulus of rubber": (at("spec/printer/modulus_gpa", 0.02), "at most 0.1"),
+    },
+    ("sag as written", SAG): {
+        "sag: half as much": (table(SAG, half_the_carriers), "at most 40"),
+        "sag: bent below the hub": (row(SAG, 4, shaft_x_mm=0.5), "bend the base"),
+        "sag: a stop too few": (table(SAG, lambda rows: rows.pop()), "other stops or balls"),
     },
     ("camera gauge", RECORD): {
         "gauge: a mark aside": (record("camera_place/marks_mm/0/0/1", plus(0.1)), "is no corner"),

@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 from tbcad_verify import main
 from tbcad_verify.programs.program_query import skipped
-from tbcad_verify.report.as_made import NOT_MODELLED, AsMade, ProcessYield
+from tbcad_verify.report.as_made import AsMade, ProcessYield
 from tbcad_verify.report.checks import Check, at_most, informative, unknown
 from tbcad_verify.report.methods import (
     ELSE,
@@ -221,12 +221,6 @@ def test_outputs_exclude_each_other(
     assert len(shown.err.splitlines()) == 1
     assert "only one of them" in shown.err
     assert not (export_folder / "verify.json").exists()
-
-
-def test_sag_is_named_where_it_is_not_known() -> None:
-    words = [AsMade(sag_mm=sag).left_out for sag in (None, float("nan"), 4.44)]
-    assert words[0] == NOT_MODELLED
-    assert words[1:] == [f"sag, {NOT_MODELLED}", f"sag 4.4 mm, {NOT_MODELLED}"]
 
 
 def rows(*checks: Check) -> list[str]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 NOT_MODELLED = "lens 2 mm, shadows, caps"
-"""The figure is of the paper's design: docs/tolerance.md has them all."""
+"""By no simulated build; the figure is of the paper's design: docs/tolerance.md has them all."""
 MOST, NEAREST = 3, 2  # processes that can, and that cannot, of which the verdict tells
 GOOD = 0.95  # share of few builds that stands for a process that can make a design
 NOT_SIMULATED = "Can be made: tbcad tolerance FOLDER simulates builds with manufacturing errors"
@@ -30,16 +29,6 @@ class AsMade:
     # the largest coverage first; empty if they could not be simulated
     processes: tuple[ProcessYield, ...] = ()
     reason: str = ""  # why not
-    # of a ball between two stops; None without a prototype, not a number where it is not known
-    sag_mm: float | None = None
-
-    @property
-    def left_out(self) -> str:
-        """What no simulated build contains."""
-        if self.sag_mm is None:
-            return NOT_MODELLED
-        sag = "sag" if math.isnan(self.sag_mm) else f"sag {self.sag_mm:.2g} mm"
-        return f"{sag}, {NOT_MODELLED}"
 
 
 def enough_bad(builds: int) -> int:
@@ -68,5 +57,5 @@ def as_made_lines(as_made: AsMade | None, valleys: bool) -> list[str]:
         f"{enough_bad(as_made.builds)} fail: yield, median minimum in mm)",
         f"  by: {', '.join(good[:MOST]) or 'none of the built-in processes'}",
         *([f"  not by: {', '.join(others[:NEAREST])}; more: --for-process"] if others else []),
-        f"  left out: {as_made.left_out}{'; fillets, ridges not in solids' * valleys}",
+        f"  left out: {NOT_MODELLED}{'; fillets, ridges not in solids' * valleys}",
     ]

@@ -1,0 +1,55 @@
+"""What weight does to a carrier, against beams in closed form and on broken tables."""
+
+import numpy as np
+import pytest
+from tbcad_verify.mesh.mesh import indexed_mesh
+from tbcad_verify.prototype.bricks import POISSON, STEP_MM, Bricks, fill_bricks, shapes
+from tbcad_verify.prototype.sag_checks import _without_motions
+from trimesh.creation import box
+
+LENGTH, SIDE = 200.0, 20.0
+INERTIA = SIDE**4 / 12
+SHEAR = 1 / 2 / (1 + POISSON) * SIDE**2 * 5 / 6
+
+
+def bar(infill: float = 1.0) -> Bricks:
+    """A bar along x from -40 to 200, whose bricks end at x = -5."""
+    made = box((LENGTH + 40, SIDE, SIDE))
+    made.apply_translation((LENGTH / 2 - 20, 0.3, -0.2))
+    return fill_bricks(
+        indexed_mesh(np.array(made.vertices), np.array(made.faces, np.int32)), infill
+    )
+
+
+def test_a_bar_is_filled_to_half_a_small_cube() -> None:
+    filled = bar()
+    assert filled.share.sum() * STEP_MM**3 == pytest.approx((LENGTH + 40) * SIDE**2, rel=0.02)
+    assert np.ptp(filled.place[filled.share > 0], axis=0) == pytest.approx(
+        [LENGTH + 40 - STEP_MM, SIDE - STEP_MM, SIDE - STEP_MM], abs=STEP_MM
+    )
+
+
+def test_a_bar_bends_under_a_load_at_its_end_as_a_beam_does() -> None:
+    filled = bar()
+    held, end = filled.place[..., 0] < -5, filled.place[..., 0] > LENGTH - 10
+    weight = filled.share * end
+    load = filled.spread(weight / weight.sum())[:, None, None] * np.eye(3)[:, 1:]
+    moved = filled.solve(held & (filled.share > 0), load)
+    tip = np.einsum("cq,qi,cikl->kl", weight / weight.sum(), shapes(), moved[filled.node])
+    length = LENGTH
+    expected = length**3 / 3 / INERTIA + length / SHEAR
+    assert np.diag(tip[1:]) == pytest.approx([expected] * 2, rel=0.03)
+
+
+def test_walls_are_solid_and_the_rest_is_infill() -> None:
+    """Of a square of 20 mm a wall of 1.65 mm is 30.3 % of the area."""
+    share = bar(0.25).share.sum() / bar().share.sum()
+    assert share == pytest.approx(0.303 + 0.697 * 0.25, abs=0.08)
+
+
+def test_motions_of_the_whole_base_are_taken_out() -> None:
+    random = np.random.default_rng(1)
+    centre, shift, turn = (random.standard_normal(size) for size in ((6, 3), (4, 1, 3), (4, 1, 3)))
+    moved = shift + np.cross(turn, centre)
+    assert np.abs(_without_motions(moved, centre)).max() < 1e-12
+    assert np.abs(_without_motions(random.standard_normal((4, 6, 3)), centre)).max() > 0.1
