@@ -10,6 +10,7 @@ from tbcad.prototype.arrangement import PrototypeModel, arrange, arrangements
 from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.base.solid import carrier_parts
 from tbcad.prototype.drive.balance import ball_masses
+from tests.prototype.conftest import HEAVY
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,9 @@ class TestChoice:
         self, k: int, hold: Hold, small_design: MirrorDesign
     ) -> None:
         """The ball of one for all mirrors is too heavy for magnets at any angle of its pads."""
-        fixed = MirrorDesign(load_spec(None, ["n=6", f"prototype.k={k}"]), small_design.arrays)
+        fixed = MirrorDesign(
+            load_spec(None, ["n=6", f"prototype.k={k}", HEAVY]), small_design.arrays
+        )
         every = list(arrangements(fixed))
         assert {one.spec.prototype.base.hold for one in every} == {hold}
         held = [angle for angle in PAD_ANGLES_DEG if magnets_hold(every[0], angle)]

@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 from pydantic import Field
-from tbcad_verify.report.as_made import AsMade, enough_bad
+from tbcad_verify.report.as_made import NOT_MODELLED, AsMade, enough_bad
 from tbcad_verify.report.methods import KEY_FIGURES
 
 from tbcad.cad.formats.checked_files import Finite, Record, read_json
@@ -150,7 +150,7 @@ def _as_made(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
         "<p class=note>Larger margins give larger yields: <code>tbcad build --for-process</code>; "
         "causes: <code>tbcad tolerance</code>.</p>"
     )
-    yield f"<p class=note>Left out: {escape(as_made.left_out)}.</p></div>"
+    yield f"<p class=note>Left out: {NOT_MODELLED}.</p></div>"
 
 
 def checks_html(verdict: Verdict | None) -> Iterator[str]:

@@ -283,7 +283,7 @@ class TestPrototype:
 
 def test_the_papers_design_has_the_sizes_it_was_tried_with() -> None:
     prototype = load_spec(None).prototype
-    assert (prototype.largest_ball_mm, prototype.ball_wall_mm) == (60, 3)
+    assert (prototype.largest_ball_mm, prototype.ball_wall_mm) == (40, 3)
     assert (prototype.post_diameter_mm, prototype.camera_diameter_mm) == (20, 60)
     assert (prototype.auto_direction_max_deg, prototype.auto_direction_median_deg) == (3.5, 1.5)
     assert (prototype.stage.disc_mm, prototype.stage.top_mm) == (17, -19)

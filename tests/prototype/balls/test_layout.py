@@ -26,8 +26,9 @@ from tbcad.prototype.balls.selection import (
     coverable,
 )
 from tbcad.prototype.balls.stops import plan_stops, stop_requests
+from tests.prototype.conftest import HEAVY
 
-SPEC = load_spec(None)
+SPEC = load_spec(None, [HEAVY])
 LIMITS = SPEC.prototype
 DEGREE = np.radians(1)
 

@@ -19,6 +19,7 @@ from tbcad.prototype.base.layout import _inner as inner_line
 from tbcad.prototype.base.layout import _sector as sector
 from tbcad.prototype.base.profile import LightSpheroid, distance_outside
 from tbcad.prototype.base.seats import OFF_PATH_MM, insertion_clearance, seat_layout, thin_rims
+from tests.prototype.conftest import HEAVY
 
 SPEC = BaseSpec()
 
@@ -66,7 +67,7 @@ class TestSeats:
     ) -> None:
         assert insertion_clearance(base.seats).min() > OFF_PATH_MM
         assert not thin_rims(base.seats).any()
-        ten = prototype_layout(load_spec(None, ["prototype.k=10"]), paper_design)
+        ten = prototype_layout(load_spec(None, ["prototype.k=10", HEAVY]), paper_design)
         seats = seat_layout(SPEC, ten)
         cosine = -dot(seats.insertion, seats.axis) / norm(seats.insertion)
         assert 5 < np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 31
@@ -162,7 +163,8 @@ class TestHub:
         """The zero disc lies on that face, and is wider than the hub."""
         thin, thick = (
             base_layout(
-                changed_spec(drive="stage-60", hold="glue", floor_mm=floor), small_prototype
+                changed_spec(drive="stage-60", hold="glue", floor_mm=floor, rib_height_mm=8.0),
+                small_prototype,
             )
             for floor in (2.0, 20.0)
         )

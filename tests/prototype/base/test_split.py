@@ -51,7 +51,7 @@ def split_at(prototype: PrototypeLayout, bed: float, count: int) -> tuple[BaseLa
 @pytest.fixture(
     scope="module",
     params=[
-        ("small_prototype", 127.0, 3),
+        ("small_prototype", 130.0, 3),
         pytest.param(("small_prototype", 150.0, 2), marks=pytest.mark.slow),
         pytest.param(("paper_prototype", 190.0, 2), marks=pytest.mark.slow),
     ],

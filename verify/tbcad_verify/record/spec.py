@@ -99,8 +99,8 @@ class PrinterSpec(Strict):
     """Printer and material of all printed parts of the prototype but caps."""
 
     density_g_cm3: float = Field(gt=0, le=20)
-    modulus_gpa: float = Field(gt=0, le=1000)
-    infill: float = Field(gt=0, le=1)
+    modulus_gpa: float = Field(gt=0, le=300)
+    infill: float = Field(ge=0.05, le=1)
     bed_mm: list[Annotated[float, Field(ge=20, le=2000)]] = Field(min_length=3, max_length=3)
     bed_margin_mm: float = Field(ge=0, le=50)
 
