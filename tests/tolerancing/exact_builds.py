@@ -107,7 +107,7 @@ def displaced_coverage(array: MirrorArray, field: SmoothField, numbers: np.ndarr
     minimum of each edge is sampled ever more closely: without errors of the build the result is
     the designed coverage within 2e-5 mm.
     """
-    mirror, arc = _counted_sides(array)
+    mirror, arc = _counted(array.cells, ~array.cells.halved)
     low, high = np.zeros(len(arc)), np.ones(len(arc))
     for samples in (ALONG, *CLOSER):
         t = np.linspace(low, high, samples, axis=1)
@@ -117,16 +117,6 @@ def displaced_coverage(array: MirrorArray, field: SmoothField, numbers: np.ndarr
     result = np.full(array.cells.mirrors, np.inf)
     np.minimum.at(result, mirror, 2 * miss.min(axis=1))
     return result
-
-
-def _counted_sides(array: MirrorArray) -> tuple[np.ndarray, np.ndarray]:
-    """Mirror and arc of each side that limits a mirror's coverage, two of (e,)."""
-    cells = array.cells
-    offsets, sides = cells.rings
-    mirror = np.repeat(np.arange(cells.mirrors), np.diff(offsets))
-    on_seam = (cells.arcs.faces[sides // 2] == cells.seam).any(axis=1)
-    counted = ~(on_seam & cells.halved[mirror])
-    return mirror[counted], sides[counted] // 2
 
 
 def _displaced_misses(

@@ -163,31 +163,6 @@ def test_larger_build_covers_more_in_proportion(halves: EdgeModels, size: float)
     assert offset[0] == pytest.approx(abs(size - 1) * beside, abs=1e-12)
 
 
-def test_radius_of_one_mirror_alone(halves: EdgeModels) -> None:
-    """Its own coverage by brute force; its neighbours see less or more, all others the same."""
-    half, alone = small("valley").arrays[0], 40
-    radius = np.zeros((1, len(half)))
-    radius[0, alone] = 0.1
-    drawn = replace(perfect(halves[0]), radius=radius)
-    found = mirror_coverage(halves[0], drawn).diameter[0]
-    assert found[alone] == pytest.approx(bisected_coverage(half, drawn, 0, alone), abs=1e-4)
-    before = mirror_coverage(halves[0], perfect(halves[0])).diameter[0]
-    faces = half.cells.arcs.faces
-    touched = np.unique(faces[(faces == alone).any(axis=1)])
-    others = np.setdiff1d(np.arange(len(half)), touched)
-    assert np.array_equal(found[others], before[others])
-    assert (found[touched[touched < len(half)]] != before[touched[touched < len(half)]]).any()
-
-
-def test_coat_too_thick_is_radii_too_large(halves: EdgeModels) -> None:
-    m = len(halves[0])
-    coat, _ = draw(Errors(coating=Error(0, 0.03)), 1, range(1), m)
-    radii, _ = draw(Errors(sphere_radius=Error(0, 0.03)), 1, range(1), m)
-    both = [mirror_coverage(halves[0], one).diameter for one in (coat, radii)]
-    assert np.array_equal(*both)
-    assert (both[0] != mirror_coverage(halves[0], perfect(halves[0])).diameter).all()
-
-
 # Random builds
 
 
