@@ -2,13 +2,14 @@
 
 import csv
 import math
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from tbcad.app.cli import run
 from tbcad.common import schedule
 from tbcad.common.results import (
     SUMMARY_COLUMNS,
@@ -190,13 +191,11 @@ def test_which_designs_are_the_papers() -> None:
         assert with_lens_of_table_i(spec).camera.hfov_deg == lens
 
 
-def test_command_writes_and_shows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_writes_and_shows(tmp_path: Path, cli: Callable[..., Any]) -> None:
     out = tmp_path / "studies"
-    arguments = ["study", "capture-area", "--from", "4", "--to", "4", "--out", str(out)]
-    assert run(arguments) == 0
-    shown = capsys.readouterr()
-    assert "21.2 mm" in shown.out
-    assert "capture-area.csv" in shown.out
+    shown = cli("study", "capture-area", "--from", "4", "--to", "4", "--out", out).out
+    assert "21.2 mm" in shown
+    assert "capture-area.csv" in shown
     assert (out / "capture-area.png").stat().st_size > 10_000
 
 
