@@ -3,7 +3,6 @@
 import csv
 import math
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -211,13 +210,11 @@ def wide() -> MirrorDesign:
 def window(at: Reflector, mirror: int) -> float:
     """Area of a mirror's cell in the picture, in pixels, from its arcs alone."""
     offsets, sides = at.cells.rings
-    steps, total = np.linspace(0, 1, 200), 0.0
-    for side in sides[offsets[mirror] : offsets[mirror + 1]]:
-        t = steps if side % 2 == 0 else steps[::-1]
-        point = at.camera.project(at.cells.arcs.at(np.full(len(t), side // 2), t))
-        for (x0, y0), (x1, y1) in pairwise(point):
-            total += (x0 * y1 - x1 * y0) / 2
-    return abs(total)
+    own, steps = sides[offsets[mirror] : offsets[mirror + 1]], np.linspace(0, 1, 200)
+    t = np.where((own % 2 == 0)[:, None], steps, steps[::-1])
+    point = at.cells.arcs.at(np.broadcast_to((own // 2)[:, None], t.shape), t)
+    x, y = at.camera.project(point.reshape(-1, 3)).T
+    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
 
 
 def test_pixels_on_mirrors_are_the_areas_of_their_cells(wide: MirrorDesign) -> None:

@@ -17,7 +17,17 @@ from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES
 from tbcad.core.optics.reflection import miss_distances, reflected_rays
 from tbcad.core.optics.surfaces import Surfaces
-from tbcad.tolerancing.montecarlo.draws import ShellDraws, SmoothField
+from tbcad.tolerancing.montecarlo.draws import (
+    ShellDraws,
+    SmoothField,
+    draw,
+    draw_kinds,
+    pivots,
+    shell_error_shapes,
+    smooth_field,
+)
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, warp_maps_of
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
 
 FINE = 5  # rounds of refinement with which the slow tracing is good to 1e-8 mm
 Heights: TypeAlias = Callable[[int, np.ndarray], np.ndarray]
@@ -97,6 +107,21 @@ def surrounded(array: MirrorArray, shift: np.ndarray) -> np.ndarray:
     )
     turned = np.diff(np.unwrap(angle, axis=1)[:, [0, -1]], axis=1)[:, 0]
     return np.abs(np.bincount(mirror, turned)) > np.pi
+
+
+def drawn(halves: EdgeModels, errors: Errors, builds: range) -> tuple[ShellDraws, ShellDraws]:
+    maps, half = warp_maps_of(halves, errors), halves[0]
+    return draw(errors, 7, builds, len(half), maps, len(half.walls))
+
+
+def warp_fields(
+    halves: EdgeModels, errors: Errors, builds: range
+) -> tuple[list[SmoothField], np.ndarray]:
+    """Of both halves the fields of `drawn`, and their random numbers (s, 2, K, 3)."""
+    chosen = pivots(halves[0].apex, errors.warp.length)
+    fields = [smooth_field(half.apex, errors.warp.length, chosen) for half in halves]
+    shapes = shell_error_shapes(len(halves[0]), len(chosen))
+    return fields, draw_kinds(errors, 7, builds, shapes)["warp"]
 
 
 def displaced_coverage(array: MirrorArray, field: SmoothField, numbers: np.ndarray) -> np.ndarray:

@@ -58,19 +58,11 @@ class Machine:
 class Double:
     """What controls a machine, in a time that runs faster than the clock."""
 
-    def __init__(
-        self,
-        switch_deg: float,
-        angle: float = 3.7,
-        see: Callable[[Machine], None] = lambda _: None,
-    ) -> None:
-        """Control a machine whose home switch and base are at angles, degrees.
-
-        It is shown to `see` whenever it rests and a line is done.
-        """
+    def __init__(self, switch_deg: float, angle: float = 3.7) -> None:
+        """Control a machine whose home switch and base are at angles, degrees."""
         self.speed, self._since, self._until_then = SPEED, monotonic(), 0.0
-        self.switch_deg, self.see = switch_deg, see
-        self.machine = Machine(angle)
+        self.switch_deg, self.machine = switch_deg, Machine(angle)
+        self.see: Callable[[Machine], None] = lambda _: None  # when it rests and a line is done
         self.released: Callable[[Machine], None] = lambda _: None
         self.fault: Fault = lambda number, line: None
         self.on_line: Callable[[int], None] = lambda number: None
@@ -117,11 +109,10 @@ class GrblDouble(threading.Thread, Double):
         switch_deg: float,
         firmware: str = "grblhal",
         angle: float = 3.7,
-        see: Callable[[Machine], None] = lambda _: None,
     ) -> None:
         """Control a machine by settings, by number; the firmware is grblhal or grbl."""
         threading.Thread.__init__(self, daemon=True)
-        Double.__init__(self, switch_deg, angle, see)
+        Double.__init__(self, switch_deg, angle)
         self._master, self._slave = pty.openpty()
         tty.setraw(self._master)
         tty.setraw(self._slave)

@@ -23,7 +23,7 @@ from threading import Lock, RLock, Thread
 from time import sleep
 from typing import Any
 
-from tests.rig.control.grbl_double import Double, Machine, Motion
+from tests.rig.control.grbl_double import Double, Motion
 
 AHEAD_S, QUEUE_S, TICK_S = 0.25, 1.0, 0.0005
 MOTOR = "manual_stepper base"
@@ -44,14 +44,9 @@ class KlipperDouble(Double):
 
     lines_before = 34  # from the connection to the first photograph
 
-    def __init__(
-        self,
-        settings: dict[str, dict[str, Any]],
-        switch_deg: float,
-        see: Callable[[Machine], None] = lambda _: None,
-    ) -> None:
+    def __init__(self, settings: dict[str, dict[str, Any]], switch_deg: float) -> None:
         """Control a machine by settings, by section."""
-        super().__init__(switch_deg, see=see)
+        super().__init__(switch_deg)
         self.settings = settings
         self.unknown: list[str] = []
         self.state, self.message = "ready", "Printer is ready"

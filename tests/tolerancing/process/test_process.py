@@ -46,20 +46,15 @@ def refused(file: Path, text: str | bytes) -> str:
     return said.removeprefix(f"{file}: ")
 
 
-def table(magnitude: float, mean: float, **others: str) -> str:
-    """A whole file whose kinds have the same figures."""
+def table(magnitude: float, mean: float, without: str = "", **others: str) -> str:
+    """A file whose kinds have the same figures, whole but for one kind."""
     head = 'name = "even"\ntitle = "All the same"\nschema = 1\nball_grade = "G3"\n'
     body = f'magnitude = {magnitude}\nmean = {mean}\nsource = "tests"\n'
     form = f'magnitude = {magnitude}\nsource = "tests"\n'
     forms = dict.fromkeys(("waviness_um", "cutter_radius_mm", "ridge_rounding_um"), form)
     bodies = {"warp_um": f"{form}length_mm = 50\n"} | forms | others
-    return head + "".join(f"[{kind}]\n{bodies.get(kind, body)}" for kind in KINDS)
-
-
-def without(text: str, kind: str) -> str:
-    """A file without one kind."""
-    start = text.index(f"[{kind}]")
-    return text[:start] + text[text.index("[", start + 1) :]
+    kinds = (kind for kind in KINDS if kind != without)
+    return head + "".join(f"[{kind}]\n{bodies.get(kind, body)}" for kind in kinds)
 
 
 class TestBuiltIn:
@@ -133,7 +128,7 @@ FILES: tuple[tuple[str | bytes, str], ...] = (
     (table(1, 0).replace('"G3"', '"G4"'), "ball_grade is 'G4', allowed is G3 or G5"),
     (table(1, 0).replace("schema = 1", "schema = 2"), "schema is 2, allowed is 1"),
     (table(1, 0).replace("schema = 1", "schema = true"), "allowed is a whole number"),
-    *((without(table(1, 0), kind), f"{kind} is missing") for kind in ("warp_um", "waviness_um")),
+    *((table(1, 0, kind), f"{kind} is missing") for kind in ("warp_um", "waviness_um")),
     *((table(1, 0, **{kind: f"{body}\n"}), said) for kind, body, said in BODIES),
 )
 
