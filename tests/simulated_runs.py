@@ -21,7 +21,6 @@ from tbcad.rig.simulated_run.photographs import ImagingChain, SimulatedRun
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.process.process import load_process, process_errors
 from tbcad.tolerancing.prototype.gravity import weightless
-from tbcad.types import Floats
 
 FINER = 2  # pixels for one of the export's: highlights of few pixels are hard to see
 SEED = 3  # of build and noise
@@ -85,11 +84,3 @@ def small_run(
     still = [sag_motion(machine, np.zeros((len(kept), len(plan), 3)))]
     arm = np.where(is_cap(plan), norm(plan.centre - plan.body_centre), 0.0)
     return Small(run, prototype_prior(machine, still, kinds, arm, series))
-
-
-def photograph_centroid(image: Floats, place: Floats, radius: int) -> Floats:
-    """Centroid (2,) of an image's light within a square about a place."""
-    x, y = np.rint(place).astype(int)
-    rows, columns = np.mgrid[y - radius : y + radius + 1, x - radius : x + radius + 1]
-    light = image[rows, columns].astype(np.float64)
-    return np.array([(light * columns).sum(), (light * rows).sum()]) / light.sum()

@@ -6,9 +6,8 @@ import json
 import subprocess
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 FLAGS = (
@@ -44,15 +43,7 @@ class Browser:
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
 
-    def __enter__(self) -> "Browser":
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        at: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         self._socket.close()
         self._loop.run_until_complete(asyncio.sleep(0))
         self._loop.close()
@@ -147,7 +138,7 @@ def chromium(program: str, profile: Path) -> Iterator[Browser]:
     words = [program, *FLAGS, f"--user-data-dir={profile}", "about:blank"]
     process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        with Browser(_port(profile / "DevToolsActivePort")) as browser:
+        with closing(Browser(_port(profile / "DevToolsActivePort"))) as browser:
             yield browser
     finally:
         process.terminate()

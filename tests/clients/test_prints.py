@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 import tbcad
-from tbcad.app.cli import run
 from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.core.mirrors.array import design
 from tbcad.prototype.arrangement import arrange
@@ -32,7 +31,6 @@ FILAMENT_MM3 = 68.0 / 1.27e-3  # a third of the 203 g that coupons of all sizes 
 FILAMENT_MM = 1.75
 HOURS = {"d": 24.0, "h": 1.0, "m": 1 / 60, "s": 1 / 3600}
 
-SMALL = ("optics.n=4", "prototype.k=3", "mesh.structure_error_mm=0.1")
 BED_MIDDLE = 200.0
 # docs/assembly.md: layers of 0.2 mm, supports below slopes of 40 degrees, on the build plate only.
 SETTINGS = (
@@ -50,15 +48,6 @@ COUPON = (
 NEAR_MM = (0.0, 1.0)  # in front of a pad
 BESIDE_MM = 0.3  # its edge
 STEP_MM = 0.5
-
-
-@pytest.fixture(scope="module")
-def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("supports") / "export"
-    options = [word for key in SMALL for word in ("--set", key)]
-    words = ["build", "--parts", "prototype", "--no-verify", *options, "--out", str(folder)]
-    assert run(words) == 0
-    return folder
 
 
 def sliced(file: Path, *settings: str) -> str:
@@ -85,10 +74,10 @@ def supports(code: str) -> Iterator[np.ndarray]:
             place = after
 
 
-def test_supports_on_the_build_plate_touch_no_pad(export: Path) -> None:
-    record = json.loads((export / "prototype.json").read_text())
+def test_supports_on_the_build_plate_touch_no_pad(prototype_build: Path) -> None:
+    record = json.loads((prototype_build / "prototype.json").read_text())
     part = next(one for one in record["parts"] if one["name"] == "carrier")
-    lines = list(supports(sliced(export / "carrier.stl", *CARRIER)))
+    lines = list(supports(sliced(prototype_build / "carrier.stl", *CARRIER)))
     assert lines
     points = np.concatenate(lines)
     for seat in record["seats"]:

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tbcad.app.cli import run
 from tbcad.prototype.gravity.compliance import N_PER_G
 from tbcad.prototype.gravity.sag import read_sag
 from tbcad.records.tables import BallRow
@@ -19,22 +18,12 @@ pytestmark = [
     pytest.mark.skipif(not shutil.which("ccx"), reason="calculix-ccx is not installed"),
 ]
 
-SMALL = ("optics.n=4", "prototype.k=3", "mesh.structure_error_mm=0.1", "printer.infill=1")
 SIZE_MM, CURVED = 8.0, 8
 MODULUS_MPA, POISSON, DENSITY = 2000.0, 0.37, 1.27e-9  # t/mm^3
 G_MM_S2 = 9806.65
 BORE_MM = 8.0  # of the shaft, on which the part is held
 NEAR_MM = 6.0  # nodes no farther from a ball's surface carry it
 GMSH_TO_CALCULIX = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("sag") / "build"
-    options = [word for key in SMALL for word in ("--set", key)]
-    words = ["build", "--parts", "prototype", "--no-verify", *options, "--out", str(folder)]
-    assert run(words) == 0
-    return folder
 
 
 def tetrahedra(step: Path) -> tuple[Floats, Ints]:
@@ -98,14 +87,14 @@ def motion_of(at: Floats, nodes: Floats, moved: Floats) -> Floats:
     return np.linalg.lstsq(motion.reshape(-1, 6), moved.ravel())[0][:3]
 
 
-def test_balls_sag_as_in_calculix(built: Path, tmp_path: Path) -> None:
-    found = read_sag(built)
+def test_balls_sag_as_in_calculix(prototype_build: Path, tmp_path: Path) -> None:
+    found = read_sag(prototype_build)
     assert found is not None
-    record = json.loads((built / "prototype.json").read_text())
+    record = json.loads((prototype_build / "prototype.json").read_text())
     part = next(one for one in record["parts"] if one["name"] == "carrier")
-    nodes, elements = tetrahedra(built / part["step"])
+    nodes, elements = tetrahedra(prototype_build / part["step"])
     nodes = nodes @ found.axes.T
-    balls = BallRow.read(built)
+    balls = BallRow.read(prototype_build)
     near = [
         np.flatnonzero(np.linalg.norm(nodes - at, axis=1) < ball.body_radius_mm + NEAR_MM)
         for at, ball in zip(found.centre, balls, strict=True)

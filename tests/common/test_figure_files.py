@@ -42,12 +42,8 @@ def test_colours_are_those_of_the_palette() -> None:
     assert all(colour in text for colour in CYCLE[:2])
 
 
-def rgb(colours: list[str] | tuple[str, ...]) -> np.ndarray:
-    """Red, green, blue of `#rrggbb`, 0 to 1, (m, 3)."""
-    return np.array([[int(one[k : k + 2], 16) for k in (1, 3, 5)] for one in colours]) / 255
-
-
 def test_shades_are_those_of_the_plots() -> None:
     values = np.linspace(-3, 7, 41)
     expected = matplotlib.colormaps[SHADES](np.linspace(0, 1, 41))[:, :3]
-    assert rgb(shades(values)) == pytest.approx(expected, abs=0.07)
+    found = np.array([matplotlib.colors.to_rgb(one) for one in shades(values)])
+    assert found == pytest.approx(expected, abs=0.07)

@@ -17,13 +17,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tbcad_verify.run.processes import at_once
 
 from tbcad.common import schedule
-from tbcad.common.schedule import cores, run_units, versions
+from tbcad.common.schedule import background_processes, cores, run_units, versions
+from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
 
 HOST = "127.0.0.1"
-Environment = dict[str, str]
 
 
 def drawn(unit: int) -> float:
@@ -80,12 +81,10 @@ class TestThreads:
 class Cluster:
     """A scheduler and its workers, each a process."""
 
-    def __init__(self, folder: Path, extra: Environment | None = None) -> None:
+    def __init__(self, folder: Path) -> None:
         pytest.importorskip("distributed")
         self.folder, file = folder, folder / "scheduler.json"
-        self.scheduler = self._started(
-            "scheduler", "--port", "0", "--scheduler-file", str(file), extra=extra
-        )
+        self.scheduler = self._started("scheduler", "--port", "0", "--scheduler-file", str(file))
         self.workers: list[subprocess.Popen[bytes]] = []
         until(lambda: file.exists() and bool(file.read_text()))
         self.address: str = json.loads(file.read_text())["address"]
@@ -104,14 +103,11 @@ class Cluster:
             process.kill()
             process.wait()
 
-    def _started(
-        self, kind: str, *options: str, extra: Environment | None = None
-    ) -> subprocess.Popen[bytes]:
+    def _started(self, kind: str, *options: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "dask", kind, "--host", HOST, "--no-dashboard", *options]
         return subprocess.Popen(
             command,
             cwd=self.folder,  # which Python's -m would look into first: not that of the tests
-            env={**os.environ, **(extra or {})},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
@@ -222,6 +218,37 @@ class TestCluster:
             run_units(work, [3], standing.address)
 
 
+def write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def refuse(text: str) -> None:
+    raise SpecError(text)
+
+
+def die() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+class TestBackground:
+    def test_all_is_done_at_the_end_of_the_block(self, tmp_path: Path) -> None:
+        with background_processes() as submit:
+            submit(write, tmp_path / "there", "x")
+            write(tmp_path / "here", "y")
+        assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"there": "x", "here": "y"}
+
+    def test_what_it_raises_is_raised(self) -> None:
+        with pytest.raises(SpecError, match="too thin"), background_processes() as submit:
+            submit(refuse, "too thin")
+        with pytest.raises(SpecError, match="too thin"):
+            at_once(refuse, "too thin")
+
+    def test_a_process_that_dies_is_told(self) -> None:
+        died = r"ended before its work was done: crashed \(SIGKILL\)"
+        with pytest.raises(RuntimeError, match=died), background_processes() as submit:
+            submit(die)
+
+
 class TestRefused:
     def test_without_dask(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "distributed", None)
@@ -267,19 +294,19 @@ class TestRefused:
             raise ModuleNotFoundError("tbcad.common", name="tbcad.common")
 
     @pytest.mark.slow
-    def test_a_unit_that_kills_its_workers(self, tmp_path: Path) -> None:
-        cluster = Cluster(tmp_path, {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"})
+    def test_a_unit_that_kills_its_workers(
+        self, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+    ) -> None:
+        monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "1")
+        cluster = request.getfixturevalue("cluster")
 
         def work(unit: int) -> None:
             import os
 
             os._exit(1)
 
-        try:
-            cluster.start(3)
-            said = refusal(work, [1], cluster.address)
-        finally:
-            cluster.stop()
+        cluster.start(3)
+        said = refusal(work, [1], cluster.address)
         assert "2 workers died over one unit of work: give the workers more memory" in said
 
     @pytest.mark.slow

@@ -15,11 +15,9 @@ from tbcad.mirror_limits.sensitivity import (
     Deviation,
     MirrorLimits,
     Sensitivities,
-    independent_classes,
     mirror_limits,
     sensitivities,
     tilt_axes,
-    touching,
 )
 from tbcad.tolerancing.montecarlo.coverage import coverage
 from tbcad.tolerancing.montecarlo.edge_model import APEX, CURVATURE, edge_models, surface_tables
@@ -79,15 +77,6 @@ def test_a_tilt_turns_the_normal_at_the_apex(small_design: MirrorDesign) -> None
     axes = tilt_axes(designed[:, 3:6])
     assert np.einsum("mkd,md->mk", axes, turned) == pytest.approx(tilt[0] * 1e-3, rel=1e-9)
     assert np.abs(np.einsum("md,md->m", turned, designed[:, 3:6])).max() < 1e-12
-
-
-def test_a_mirror_deviates_alone(small_design: MirrorDesign) -> None:
-    """No two of a class touch, or touch the same third mirror."""
-    near = touching(reflectors(small_design)[0])
-    classes = independent_classes(near)
-    for mirror, others in enumerate(near):
-        around = classes[np.append(others, mirror)]
-        assert len(set(around.tolist())) == len(around)
 
 
 def test_losses_are_those_of_mirrors_that_deviate_one_by_one(

@@ -1,8 +1,11 @@
 """Files of an order as other readers get them, what a chain holds, and the page of a workshop."""
 
 import json
+import shutil
+from collections.abc import Callable
 from math import hypot, sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -107,19 +110,18 @@ def test_tolerances_as_a_parser_of_the_grammar_reads_them(written: Path) -> None
 
 
 def test_what_is_refused(
-    record: Path, exports: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    record: Path, exports: Path, tmp_path: Path, cli: Callable[..., Any]
 ) -> None:
-    sample, out = Path(__file__).parents[2] / "docs" / "sample", str(tmp_path / "out")
+    sample, out = Path(__file__).parents[2] / "docs" / "sample", tmp_path / "out"
     for words, wrong in (
-        ([str(record)], "shell_a.step is not there: build the shell too"),
-        ([str(sample), "--out", out], "its mirrors are planar"),
-        ([str(exports), "--yield", "1.5"], "--yield 1.5: allowed is"),
+        ((record,), "shell_a.step is not there: build the shell too"),
+        ((sample, "--out", out), "its mirrors are planar"),
+        ((exports, "--yield", "1.5"), "--yield 1.5: allowed is"),
     ):
-        assert run(["order", "--chain", "cnc", *words]) == 2
-        assert wrong in capsys.readouterr().err
-    assert run(["inspection", str(exports)]) == 2
-    assert "tbcad inspection is called order: write tbcad order" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+        assert wrong in cli("order", "--chain", "cnc", *words, code=2).err
+    told = cli("inspection", exports, code=2).err
+    assert "tbcad inspection is called order: write tbcad order" in told
+    assert not out.exists()
 
 
 def test_same_bytes(exports: Path, written: Path, tmp_path: Path) -> None:
@@ -178,12 +180,12 @@ def test_the_page_is_whole_and_legible(exports: Path, written: Path) -> None:
 
 
 def test_what_is_not_held_is_never_quoted_as_held(
-    exports: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    exports: Path, tmp_path: Path, cli: Callable[..., Any]
 ) -> None:
     out = tmp_path / "out"
-    assert run(["order", str(exports), "--chain", "sla", "--out", str(out)]) == 1
+    told = cli("order", exports, "--chain", "sla", "--out", out, code=1).out
     remedy = "not held: order a larger margin with --for-process sla"
-    offset = next(line for line in capsys.readouterr().out.splitlines() if "offset" in line)
+    offset = next(line for line in told.splitlines() if "offset" in line)
     assert offset.endswith(remedy)
     assert (out / "shell_a_tolerances.step").read_text("ascii").count(remedy) >= 2
     record = json.loads((out / "order.json").read_text(encoding="utf-8"))
@@ -191,27 +193,23 @@ def test_what_is_not_held_is_never_quoted_as_held(
     assert (table(out, "offset_chain_um") > table(out, "offset_limit_um")).any()
 
 
-def test_chains_that_are_refused(
-    exports: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_chains_that_are_refused(exports: Path, tmp_path: Path, cli: Callable[..., Any]) -> None:
     own, out = tmp_path / "own.toml", tmp_path / "out"
     for text, wrong in (
         (OWN + "material = { value = 'Ω', source = 'test' }", "step bath"),
         (OWN + "measured_with = { value = 'a', source = 'test', uncertainty_um = 0 }", "step bath"),
     ):
         own.write_text(text, encoding="utf-8")
-        assert run(["order", str(exports), "--chain", str(own), "--out", str(out)]) == 2
-        assert wrong in capsys.readouterr().err
+        assert wrong in cli("order", exports, "--chain", own, "--out", out, code=2).err
     process = load_process("nickel-milled").model_copy(update={"mandrel_cutter_mm": 90.0})
     limits = MirrorLimits(np.ones((98, 3)), np.ones((98, 3)), 1.0)
     with pytest.raises(InputError, match="radius of 90 mm, allowed is less than"):
         chain_of(read_export(exports), process, "big", limits, 0.99)
-    (tmp_path / "shells").mkdir()
-    for file in exports.iterdir():
-        if "mandrel" not in file.name:
-            (tmp_path / "shells" / file.name).write_bytes(file.read_bytes())
-    assert run(["order", str(tmp_path / "shells"), "--out", str(out)]) == 2
-    assert "tbcad build --set shell.negative=true" in capsys.readouterr().err
+    shells = shutil.copytree(
+        exports, tmp_path / "shells", ignore=shutil.ignore_patterns("*mandrel*")
+    )
+    told = cli("order", shells, "--out", out, code=2).err
+    assert "tbcad build --set shell.negative=true" in told
     assert not out.exists()
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.TopoDS import TopoDS_Face
 
 from tbcad.app.api import order
 from tbcad.cad.formats.step import StepError, read_named_solid
@@ -33,17 +32,6 @@ from tests.pedestal_designs import pedestal_design
 from tests.shell_meshes import export_with_solids
 
 TARGET = 60.0
-
-
-def face_sphere(face: TopoDS_Face) -> tuple[float, float, float]:
-    """Centre of the sphere that a face is on."""
-    return BRepAdaptor_Surface(face).Sphere().Location().Coord()  # type: ignore[no-any-return]
-
-
-def face_plane(face: TopoDS_Face) -> tuple[np.ndarray, np.ndarray]:
-    """A point and the normal of the plane that a face is on."""
-    plane = BRepAdaptor_Surface(face).Plane()
-    return np.array(plane.Location().Coord()), np.array(plane.Axis().Direction().Coord())
 
 
 @pytest.fixture(scope="module")
@@ -114,15 +102,15 @@ def test_a_solid_that_is_read_has_each_face_by_its_name(folder: Path, made: Mirr
     """The kernel reads faces in another order than the file has them."""
     array = made.arrays[1]
     solid = read_named_solid(folder / "shell_b.step")
-    faces = dict(solid.faces)
-    centre = np.array([face_sphere(faces[name]) for name in array.ids])
+    on = {name: BRepAdaptor_Surface(face) for name, face in solid.faces}
+    centre = np.array([on[name].Sphere().Location().Coord() for name in array.ids])
     assert np.abs(centre - array.modelled_cells.mirror_surfaces.centre).max() < 1e-9
     walls = groove_walls(array.modelled_cells)
     names = wall_names(array.ids, array.modelled_cells)
     for name, point, normal in zip(names, walls.point, walls.normal, strict=True):
-        at, axis = face_plane(faces[name])
-        assert np.linalg.norm(np.cross(axis, normal)) < 1e-9
-        assert abs((point - at) @ axis) < 1e-8
+        plane = on[name].Plane()
+        assert np.linalg.norm(np.cross(plane.Axis().Direction().Coord(), normal)) < 1e-9
+        assert abs((point - plane.Location().Coord()) @ normal) < 1e-8
 
 
 def test_tolerances_that_are_not_as_given_are_refused(

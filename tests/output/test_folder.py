@@ -30,11 +30,6 @@ def fill(folder: Path, version: int) -> None:
     (folder / "verify.json").write_text(str(version))
 
 
-def fill_late(new: Path, out: Path) -> None:
-    fill(new, 2)
-    (out / "late.txt").write_text("mine")
-
-
 def export(out: Path, version: int, *, force: bool = False) -> None:
     with replacing(out, "build", force) as new:
         fill(new, version)
@@ -75,11 +70,16 @@ def no_exchange(*_: object) -> bool:
     return False
 
 
-@pytest.fixture(params=["exchange", "two moves"])
-def swap(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+def no_link(*_: object, **__: object) -> None:
+    raise OSError(errno.EPERM, "no hard links here")
+
+
+@pytest.fixture(params=["exchange", "two moves", "copies"])
+def swap(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     if request.param == "two moves":
         monkeypatch.setattr(folder_module, "_exchange", no_exchange)
-    return str(request.param)
+    if request.param == "copies":
+        monkeypatch.setattr(os, "link", no_link)
 
 
 @pytest.fixture
@@ -183,11 +183,8 @@ class TestReplacing:
 
     def test_a_file_that_comes_while_building_is_not_lost(self, out: Path) -> None:
         export(out, 1)
-        with (
-            pytest.raises(InputError, match=r"late\.txt"),
-            replacing(out, "build", force=False) as new,
-        ):
-            fill_late(new, out)
+        with pytest.raises(InputError, match=r"late\.txt"), replacing(out, "build", force=False):
+            (out / "late.txt").write_text("mine")
         assert version_of(out) == 1
         assert (out / "late.txt").read_text() == "mine"
 
@@ -198,21 +195,6 @@ class TestReplacing:
             export(out, version)
             assert out.readlink() == Path("disk/real")
             assert version_of(tmp_path / "disk" / "real") == version
-
-    def test_copies_where_links_cannot_be_made(
-        self, out: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        export(out, 1)
-        (out / "notes.txt").write_text("mine")
-        (out / "link").symlink_to("notes.txt")
-
-        def link(*_: object, **__: object) -> None:
-            raise OSError(errno.EPERM, "no hard links here")
-
-        monkeypatch.setattr(os, "link", link)
-        export(out, 2, force=True)
-        assert (out / "notes.txt").read_text() == "mine"
-        assert (out / "link").readlink() == Path("notes.txt")
 
 
 def test_a_failed_second_move_puts_the_old_export_back(
@@ -249,10 +231,29 @@ class TestParents:
         assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("refuse", [check_replaceable, export], ids=["check", "replace"])
+Refused = Callable[[Path, str], None]
+
+
+@pytest.fixture(
+    params=[lambda out: check_replaceable(out, "build", False), lambda out: export(out, 9)],
+    ids=["check", "replace"],
+)
+def refused(request: pytest.FixtureRequest, tmp_path: Path) -> Refused:
+    """Hold that a folder is refused with some words, and nothing changed."""
+
+    def check(out: Path, words: str) -> None:
+        before = tree(tmp_path)
+        with pytest.raises(InputError, match=words) as error:
+            request.param(out)
+        assert "\n" not in str(error.value)
+        assert tree(tmp_path) == before
+
+    return check
+
+
 class TestRefused:
     def test_places_that_are_no_folder_to_replace(
-        self, tmp_path: Path, refuse: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+        self, tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         for name in ("work/deep", "homes/me", "mount", "shut"):
             (tmp_path / name).mkdir(parents=True)
@@ -277,9 +278,9 @@ class TestRefused:
             tmp_path / "a\0b": "cannot be written",
             tmp_path / ("a" * 300): "cannot be written",
         }.items():
-            self.refused(out, refuse, words)
+            refused(out, words)
 
-    def test_what_tbcad_did_not_write(self, out: Path, refuse: Callable[..., None]) -> None:
+    def test_what_tbcad_did_not_write(self, out: Path, refused: Refused) -> None:
         export(out, 1)
         mine = out / "readme.md"
         for make, remove in (
@@ -289,7 +290,7 @@ class TestRefused:
             (mine.touch, mine.unlink),
         ):
             make()
-            self.refused(out, refuse, "readme.md")
+            refused(out, "readme.md")
             remove()
 
     @pytest.mark.parametrize(
@@ -309,35 +310,22 @@ class TestRefused:
             b'{"schema": "tbcad-manifest/1", "files": {}}' + b" " * 4_000_000,
         ],
     )
-    def test_a_manifest_that_is_none(
-        self, out: Path, refuse: Callable[..., None], manifest: bytes
-    ) -> None:
+    def test_a_manifest_that_is_none(self, out: Path, refused: Refused, manifest: bytes) -> None:
         export(out, 1)
         (out / "manifest.json").write_bytes(manifest)
-        self.refused(out, refuse, "manifest.json")
+        refused(out, "manifest.json")
         export(out, 2, force=True)
         assert (out / "manifest.json.kept").read_bytes() == manifest
         assert version_of(out) == 2
 
-    def test_a_second_writer(self, out: Path, refuse: Callable[..., None]) -> None:
+    def test_a_second_writer(self, out: Path, refused: Refused) -> None:
         with replacing(out, "build", force=False) as new:
             fill(new, 1)
-            self.refused(out, refuse, "another tbcad")
+            refused(out, "another tbcad")
             check_replaceable(out.parent / "elsewhere", "build", force=False)
         assert version_of(out) == 1
         export(out, 2)
         assert version_of(out) == 2
-
-    def refused(self, out: Path, refuse: Callable[..., None], words: str) -> None:
-        before = tree(self.tmp_path)
-        with pytest.raises(InputError, match=words) as error:
-            refuse(out, "build", False) if refuse is check_replaceable else export(out, 9)
-        assert "\n" not in str(error.value)
-        assert tree(self.tmp_path) == before
-
-    @pytest.fixture(autouse=True)
-    def _place(self, tmp_path: Path) -> None:
-        self.tmp_path = tmp_path
 
 
 KILLED = '''

@@ -17,7 +17,17 @@ from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES
 from tbcad.core.optics.reflection import miss_distances, reflected_rays
 from tbcad.core.optics.surfaces import Surfaces
-from tbcad.tolerancing.montecarlo.draws import ShellDraws, SmoothField
+from tbcad.tolerancing.montecarlo.draws import (
+    ShellDraws,
+    SmoothField,
+    draw,
+    draw_kinds,
+    pivots,
+    shell_error_shapes,
+    smooth_field,
+)
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, warp_maps_of
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
 
 FINE = 5  # rounds of refinement with which the slow tracing is good to 1e-8 mm
 Heights: TypeAlias = Callable[[int, np.ndarray], np.ndarray]
@@ -99,6 +109,21 @@ def surrounded(array: MirrorArray, shift: np.ndarray) -> np.ndarray:
     return np.abs(np.bincount(mirror, turned)) > np.pi
 
 
+def drawn(halves: EdgeModels, errors: Errors, builds: range) -> tuple[ShellDraws, ShellDraws]:
+    maps, half = warp_maps_of(halves, errors), halves[0]
+    return draw(errors, 7, builds, len(half), maps, len(half.walls))
+
+
+def warp_fields(
+    halves: EdgeModels, errors: Errors, builds: range
+) -> tuple[list[SmoothField], np.ndarray]:
+    """Of both halves the fields of `drawn`, and their random numbers (s, 2, K, 3)."""
+    chosen = pivots(halves[0].apex, errors.warp.length)
+    fields = [smooth_field(half.apex, errors.warp.length, chosen) for half in halves]
+    shapes = shell_error_shapes(len(halves[0]), len(chosen))
+    return fields, draw_kinds(errors, 7, builds, shapes)["warp"]
+
+
 def displaced_coverage(array: MirrorArray, field: SmoothField, numbers: np.ndarray) -> np.ndarray:
     """Coverage of each mirror of a shell whose every point is displaced by a field, mm, (m,).
 
@@ -107,7 +132,7 @@ def displaced_coverage(array: MirrorArray, field: SmoothField, numbers: np.ndarr
     minimum of each edge is sampled ever more closely: without errors of the build the result is
     the designed coverage within 2e-5 mm.
     """
-    mirror, arc = _counted_sides(array)
+    mirror, arc = _counted(array.cells, ~array.cells.halved)
     low, high = np.zeros(len(arc)), np.ones(len(arc))
     for samples in (ALONG, *CLOSER):
         t = np.linspace(low, high, samples, axis=1)
@@ -117,16 +142,6 @@ def displaced_coverage(array: MirrorArray, field: SmoothField, numbers: np.ndarr
     result = np.full(array.cells.mirrors, np.inf)
     np.minimum.at(result, mirror, 2 * miss.min(axis=1))
     return result
-
-
-def _counted_sides(array: MirrorArray) -> tuple[np.ndarray, np.ndarray]:
-    """Mirror and arc of each side that limits a mirror's coverage, two of (e,)."""
-    cells = array.cells
-    offsets, sides = cells.rings
-    mirror = np.repeat(np.arange(cells.mirrors), np.diff(offsets))
-    on_seam = (cells.arcs.faces[sides // 2] == cells.seam).any(axis=1)
-    counted = ~(on_seam & cells.halved[mirror])
-    return mirror[counted], sides[counted] // 2
 
 
 def _displaced_misses(

@@ -1,7 +1,7 @@
 """The margin a process needs: with made-up losses, by brute force, and with real designs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import sqrt
 from unittest.mock import Mock
 
@@ -10,13 +10,14 @@ import pytest
 
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import design
-from tbcad.core.spec.design import MAX_MARGIN, Spec
+from tbcad.core.spec.design import MAX_MARGIN, MirrorsSpec, Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.tolerancing.margin import (
     FLIP_Y,
     STEP_MM,
+    Margin,
     MirrorLosses,
     margin,
     mirror_losses,
@@ -40,23 +41,18 @@ def spec() -> Spec:
     return load_spec(None, ["n=4"])
 
 
-@dataclass(frozen=True)
-class OnlySpec:
-    """What a made-up loss needs of a design."""
+def found_margin(
+    spec: Spec,
+    loss: Loss,
+    wanted: float = 0.99,
+    mirrors: Callable[[Spec], MirrorsSpec] = lambda spec: spec.mirrors,
+) -> Margin:
+    """Where builds see the target and the margin but for what they lose; no mirrors are made."""
 
-    margin_mm: float
+    def seen(_: Errors, made: MirrorsSpec) -> np.ndarray:
+        return TARGET + made.margin_mm - loss(made.margin_mm)
 
-
-@pytest.fixture
-def without_mirrors(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Take the spec for its fast model."""
-    only = lambda: lambda spec: OnlySpec(spec.mirrors.margin_mm)  # noqa: E731
-    monkeypatch.setattr("tbcad.tolerancing.margin.solved_designs", only)
-
-
-def losing(loss: Loss) -> Callable[[Errors, EdgeModels], np.ndarray]:
-    """Coverage of builds that see the target and the margin but for what they lose."""
-    return lambda _, made: TARGET + made.margin_mm - loss(made.margin_mm)  # type: ignore[attr-defined]
+    return margin(spec, Errors(), wanted, seen, designs=mirrors)  # type: ignore[arg-type]
 
 
 def steady(loss: float | np.ndarray) -> Loss:
@@ -70,7 +66,6 @@ def brute(lost: np.ndarray, wanted: float) -> float:
     return float(steps[np.argmax(good)])
 
 
-@pytest.mark.usefixtures("without_mirrors")
 class TestMadeUpLosses:
     @pytest.mark.parametrize("start", [0.0, 3.0, 20.0])
     @pytest.mark.parametrize(
@@ -85,7 +80,7 @@ class TestMadeUpLosses:
         self, start: float, loss: Loss, needed: float
     ) -> None:
         spec = load_spec(None, ["n=4", f"mirrors.margin_mm={start}"])
-        found = margin(spec, Errors(), 0.99, losing(loss))
+        found = found_margin(spec, loss)
         assert (found.mm, found.share) == (pytest.approx(needed, abs=1e-9), 1.0)
 
     @pytest.mark.parametrize("wanted", [0.5, 0.985, 0.999])
@@ -93,7 +88,7 @@ class TestMadeUpLosses:
     def test_random_losses_against_brute_force(self, spec: Spec, seed: int, wanted: float) -> None:
         """Also with shares between those that 100 builds can have."""
         lost = np.random.default_rng(seed).normal(1.5, 0.4, 100).clip(0.05)
-        found = margin(spec, Errors(), wanted, losing(steady(lost)))
+        found = found_margin(spec, steady(lost), wanted)
         assert found.mm == pytest.approx(brute(lost, wanted), abs=1e-9)
         assert found.share == (found.mm >= lost).mean() >= wanted
 
@@ -101,19 +96,18 @@ class TestMadeUpLosses:
         "loss", [steady(MAX_MARGIN + 0.001), lambda m: np.full(10, m + 1)], ids=["much", "growing"]
     )
     def test_no_margin_is_enough(self, spec: Spec, loss: Loss) -> None:
-        found = margin(spec, Errors(), 0.99, losing(loss))
+        found = found_margin(spec, loss)
         assert (found.mm, found.share) == (None, 0)
         assert found.reason
 
 
 def test_mirrors_that_cannot_be_made(spec: Spec) -> None:
-    def refusing(made: Spec) -> OnlySpec:
+    def refusing(made: Spec) -> MirrorsSpec:
         if made.mirrors.margin_mm > 1:
             raise SpecError("mirrors overlap")
-        return OnlySpec(made.mirrors.margin_mm)
+        return made.mirrors
 
-    lost = losing(steady(np.array([0.5, 2.0, 2.0, 2.0])))
-    found = margin(spec, Errors(), 0.99, lost, designs=refusing)  # type: ignore[arg-type]
+    found = found_margin(spec, steady(np.array([0.5, 2.0, 2.0, 2.0])), mirrors=refusing)
     assert (found.mm, found.share) == (None, 0.25)
     assert found.reason == "mirrors of margin 2.00 mm: mirrors overlap"
 

@@ -1,13 +1,13 @@
 """tbcad build --for-process: the margins that a process needs, in the design that is built."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from tbcad.app.cli import run
 from tbcad.core.mirrors.array import design
 from tbcad.core.spec.load import load_spec, spec_dict
 from tbcad.errors import InputError
@@ -113,28 +113,25 @@ def test_what_cannot_be_asked(settings: list[str], wanted: float, wrong: str) ->
 
 
 @pytest.mark.slow
-def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command(tmp_path: Path, cli: Callable[..., Any]) -> None:
     """The edges are chosen; the design in the record gives the same mirrors without the process."""
-    out = tmp_path / "exports"
-    arguments = ["build", "--n", "4", "--parts", "shell", "--no-verify"]
-    arguments += ["--set", "width_px=416", "--set", "height_px=310", "--out", str(out)]
-    arguments += ["--set", "margin_mm=0.2"]
-    assert run([*arguments, "--for-process", "cnc", "--yield", "0.9"]) == 0
+    out, again = tmp_path / "exports", tmp_path / "again"
+    build = ["build", "--n", "4", "--parts", "shell", "--no-verify"]
+    build += ["--set", "width_px=416", "--set", "height_px=310"]
+    asked = [*build, "--out", out, "--set", "margin_mm=0.2"]
+    said = cli(*asked, "--for-process", "cnc", "--yield", "0.9").err
     spec = json.loads((out / "design.json").read_text())["spec"]
     mirrors, edges = spec["mirrors"], spec["shell"]["edges"]
     options = [f"mirrors.{key}={mirrors[key]}" for key in ("margin_mm", "own_margins_mm")]
     made = ProcessDesign(load_spec(None, ["n=4", *options]), 0.0)
-    said = capsys.readouterr().err
     assert margins_text(made).partition(" (")[0] in said
     assert ", for 90.0% by cnc" in said
     assert f"edges: {edges}, with a median of " in said
-    again = tmp_path / "again"
     words = [word for option in (*options, f"shell.edges={edges}") for word in ("--set", option)]
-    assert run([*arguments[:-4], "--out", str(again), *words]) == 0
+    cli(*build, "--out", again, *words)
     for name in ("mirrors.csv", "shell_a.stl"):
         assert (again / name).read_bytes() == (out / name).read_bytes()
-    assert run([*arguments, "--for-process", "clay"]) == 2
-    assert "clay" in capsys.readouterr().err
+    assert "clay" in cli(*asked, "--for-process", "clay", code=2).err
 
 
 def inserts() -> Process:

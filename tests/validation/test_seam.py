@@ -19,10 +19,11 @@ from tbcad.tolerancing.montecarlo.coverage import coverage, mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import draw
 from tbcad.tolerancing.montecarlo.edge_model import edge_model, edge_models
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tests.tolerancing.exact_builds import last_inside
 
 # Fixed-point steps of the point of reflection.
 STEPS = 60
-DIRECTIONS, HALVINGS = 360, 30
+DIRECTIONS = 360
 
 
 def reflection_points(
@@ -105,23 +106,15 @@ def reached(at: Reflector, points: np.ndarray, mirror: int, ball: float) -> np.n
 def swept(at: Reflector, mirror: int, ball: float) -> float:
     """Coverage, mm, by the rays at the outline of what the ball reaches."""
     surfaces = at.cells.surfaces
-    apex, normal = surfaces.apex[mirror], surfaces.normal[mirror]
-    radius = 1 / surfaces.curvature[mirror]
-    first = unit(np.cross(normal, [1.0, 2.0, 3.0]))
-    turn = np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)[:, None]
-    across = np.cos(turn) * first + np.sin(turn) * np.cross(normal, first)
-    low, high = np.zeros(DIRECTIONS), np.full(DIRECTIONS, 0.6)
+    normal, radius = surfaces.normal[mirror], 1 / surfaces.curvature[mirror]
+    centre = surfaces.apex[mirror] - radius * normal
 
-    def point(angle: np.ndarray) -> np.ndarray:
-        tilt = angle[:, None]
-        return np.asarray(apex + radius * (np.sin(tilt) * across + (np.cos(tilt) - 1) * normal))
+    def inside(out: np.ndarray) -> np.ndarray:
+        return reached(at, centre + radius * out, mirror, ball)
 
-    for _ in range(HALVINGS):
-        angle = (low + high) / 2
-        good = reached(at, point(angle), mirror, ball)
-        low, high = np.where(good, angle, low), np.where(good, high, angle)
-    points = point(low)
-    rays = unit(reflect(points - at.camera.pinhole, unit(points - apex + radius * normal)))
+    out = last_inside(normal, 0.6, inside, DIRECTIONS)
+    points = centre + radius * out
+    rays = unit(reflect(points - at.camera.pinhole, out))
     return float(2 * norm(np.cross(points, rays)).min())
 
 

@@ -3,11 +3,11 @@
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from tbcad.app.cli import run as tbcad
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
@@ -115,24 +115,18 @@ def either_rig(request: pytest.FixtureRequest) -> Rig:
 
 
 @pytest.fixture
-def refused(capsys: pytest.CaptureFixture[str]) -> Told:
+def refused(cli: Callable[..., Any]) -> Told:
     """The line that a command ends with that is refused."""
 
     def line_of(words: list[str]) -> str:
-        assert tbcad(words) == 2
-        *_, line = capsys.readouterr().err.splitlines()
+        *_, line = cli(*words, code=2).err.splitlines()
         assert line.startswith("tbcad: ")
-        return line
+        return str(line)
 
     return line_of
 
 
 @pytest.fixture
-def stopped(capsys: pytest.CaptureFixture[str]) -> Told:
+def stopped(cli: Callable[..., Any]) -> Told:
     """What a command says at the end of a run that is not complete."""
-
-    def text_of(words: list[str]) -> str:
-        assert tbcad(words) == 1
-        return capsys.readouterr().out
-
-    return text_of
+    return lambda words: str(cli(*words, code=1).out)

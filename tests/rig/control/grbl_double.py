@@ -58,19 +58,11 @@ class Machine:
 class Double:
     """What controls a machine, in a time that runs faster than the clock."""
 
-    def __init__(
-        self,
-        switch_deg: float,
-        angle: float = 3.7,
-        see: Callable[[Machine], None] = lambda _: None,
-    ) -> None:
-        """Control a machine whose home switch and base are at angles, degrees.
-
-        It is shown to `see` whenever it rests and a line is done.
-        """
+    def __init__(self, switch_deg: float, angle: float = 3.7) -> None:
+        """Control a machine whose home switch and base are at angles, degrees."""
         self.speed, self._since, self._until_then = SPEED, monotonic(), 0.0
-        self.switch_deg, self.see = switch_deg, see
-        self.machine = Machine(angle)
+        self.switch_deg, self.machine = switch_deg, Machine(angle)
+        self.see: Callable[[Machine], None] = lambda _: None  # when it rests and a line is done
         self.released: Callable[[Machine], None] = lambda _: None
         self.fault: Fault = lambda number, line: None
         self.on_line: Callable[[int], None] = lambda number: None
@@ -95,15 +87,15 @@ class Double:
 
 
 @dataclass
-class _Motion:
+class Motion:
     begin: float
     end: float
     start_s: float
     seconds: float
 
     def at(self, now: float) -> float:
-        share = min(1.0, (now - self.start_s) / self.seconds) if self.seconds else 1.0
-        return self.begin + share * (self.end - self.begin)
+        share = (now - self.start_s) / self.seconds if self.seconds else 1.0
+        return self.begin + min(1.0, max(0.0, share)) * (self.end - self.begin)
 
 
 class GrblDouble(threading.Thread, Double):
@@ -117,11 +109,10 @@ class GrblDouble(threading.Thread, Double):
         switch_deg: float,
         firmware: str = "grblhal",
         angle: float = 3.7,
-        see: Callable[[Machine], None] = lambda _: None,
     ) -> None:
         """Control a machine by settings, by number; the firmware is grblhal or grbl."""
         threading.Thread.__init__(self, daemon=True)
-        Double.__init__(self, switch_deg, angle, see)
+        Double.__init__(self, switch_deg, angle)
         self._master, self._slave = pty.openpty()
         tty.setraw(self._master)
         tty.setraw(self._slave)
@@ -140,10 +131,10 @@ class GrblDouble(threading.Thread, Double):
 
     def _clear(self) -> None:
         self._rx = bytearray()
-        self._motion: _Motion | None = None
+        self._motion: Motion | None = None
         self._steps: Iterator[None] = iter(())  # of the line that is done now
         self._reply, self._dropped = False, False
-        self._homing: _Motion | None = None
+        self._homing: Motion | None = None
         self._hold_later, self._blocked = False, False
         self._offset, self._feed, self._checking = 0.0, 0.0, False
 
@@ -330,42 +321,30 @@ class GrblDouble(threading.Thread, Double):
         return self._gcode(codes, words)
 
     def _system(self, line: str) -> Answer:
-        commands: dict[str, Callable[[], Answer]] = {
-            "$H": self._home,
-            "$$": self._list,
-            "$X": self._unlock,
-            "$I": self._tell,
-        }
-        if line in commands:
-            return commands[line]()
-        if match := re.fullmatch(r"\$(\d+)=(-?[\d.]+)", line):
+        if line == "$H":
+            return self._homed() if self.settings.get(22) else 5
+        if line == "$$":
+            for number, value in sorted(self.settings.items()):
+                self._say(f"${number}={value:.3f}")
+        elif line == "$I":
+            for text in BUILD_INFO[self.firmware]:
+                self._say(text)
+        elif line == "$X":
+            if self.state.startswith("Door"):
+                return 13
+            self.state = "Idle"
+        elif match := re.fullmatch(r"\$(\d+)=(-?[\d.]+)", line):
             if self.state not in ("Idle", "Alarm") or self._motion:
                 return 8
             self.settings[int(match[1])] = float(match[2])
-            return None
-        return 3
-
-    def _list(self) -> None:
-        for number, value in sorted(self.settings.items()):
-            self._say(f"${number}={value:.3f}")
-
-    def _tell(self) -> None:
-        for text in BUILD_INFO[self.firmware]:
-            self._say(text)
-
-    def _unlock(self) -> int | None:
-        if self.state.startswith("Door"):
-            return 13
-        self.state = "Idle"
+        else:
+            return 3
         return None
-
-    def _home(self) -> Answer:
-        return self._homed() if self.settings.get(22) else 5
 
     def _homed(self) -> Iterator[None]:
         self.state = "Home"
         seconds = abs(self.machine.angle - self.switch_deg) / self.settings[25] * 60
-        self._homing = _Motion(self.machine.angle, self.switch_deg, self.now, seconds)
+        self._homing = Motion(self.machine.angle, self.switch_deg, self.now, seconds)
         yield from self._until(self.now + seconds)
         pull_off = self.settings[27]
         self._mpos = -self.settings[130] + pull_off
@@ -423,4 +402,4 @@ class GrblDouble(threading.Thread, Double):
             return self._halt(2)
         speed = min(self._feed, self.settings[110]) / 60
         seconds = abs(target - self._mpos) / speed + speed / self.settings[120]
-        self._motion = _Motion(self._mpos, target, self.now, seconds)
+        self._motion = Motion(self._mpos, target, self.now, seconds)

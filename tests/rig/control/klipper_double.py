@@ -23,7 +23,7 @@ from threading import Lock, RLock, Thread
 from time import sleep
 from typing import Any
 
-from tests.rig.control.grbl_double import Double, Machine
+from tests.rig.control.grbl_double import Double, Motion
 
 AHEAD_S, QUEUE_S, TICK_S = 0.25, 1.0, 0.0005
 MOTOR = "manual_stepper base"
@@ -44,14 +44,9 @@ class KlipperDouble(Double):
 
     lines_before = 34  # from the connection to the first photograph
 
-    def __init__(
-        self,
-        settings: dict[str, dict[str, Any]],
-        switch_deg: float,
-        see: Callable[[Machine], None] = lambda _: None,
-    ) -> None:
+    def __init__(self, settings: dict[str, dict[str, Any]], switch_deg: float) -> None:
         """Control a machine by settings, by section."""
-        super().__init__(switch_deg, see=see)
+        super().__init__(switch_deg)
         self.settings = settings
         self.unknown: list[str] = []
         self.state, self.message = "ready", "Printer is ready"
@@ -81,7 +76,7 @@ class KlipperDouble(Double):
 
     @property
     def moving(self) -> bool:
-        return self.now < self._motion[3] and self.now > self._motion[2]
+        return 0 < self.now - self._motion.start_s < self._motion.seconds
 
     def run_at(self, speed: float) -> None:
         """Let its time run at another speed from now on."""
@@ -92,7 +87,7 @@ class KlipperDouble(Double):
         self.motor_on = False
         self._position, self._end = 0.0, 0.0
         self._zero = self.machine.angle
-        self._motion = (0.0, 0.0, 0.0, 0.0)
+        self._motion = Motion(0.0, 0.0, 0.0, 0.0)
         self._later: list[tuple[float, Callable[[], None]]] = []
 
     def restart(self) -> None:
@@ -109,7 +104,7 @@ class KlipperDouble(Double):
             self._later.clear()
             self._end = self.now
             self._position = self.machine.angle - self._zero
-            self._motion = (self._position, self._position, self.now, self.now)
+            self._motion = Motion(self._position, self._position, self.now, 0.0)
             self.machine.lights.clear()
             self.machine.relay = False
             self.state, self.message = state, message
@@ -117,10 +112,7 @@ class KlipperDouble(Double):
     def advance(self) -> None:
         """What has happened until now."""
         with self._lock:
-            begin, end, start, stop = self._motion
-            share = (self.now - start) / (stop - start) if stop > start else 1.0
-            share = min(1.0, max(0.0, share))
-            self.machine.angle = begin + share * (end - begin) + self._zero
+            self.machine.angle = self._motion.at(self.now) + self._zero
             while self._later and self._later[0][0] <= self.now:
                 self._later.pop(0)[1]()
 
@@ -191,7 +183,7 @@ class KlipperDouble(Double):
             with self._lock:
                 self._zero += self._position - float(words["SET_POSITION"])
                 self._position = float(words["SET_POSITION"])
-                self._motion = (self._position, self._position, 0.0, 0.0)
+                self._motion = Motion(self._position, self._position, 0.0, 0.0)
         if "MOVE" in words:
             self._move(float(words["MOVE"]), float(words["SPEED"]), words.get("STOP_ON_ENDSTOP"))
 
@@ -207,8 +199,10 @@ class KlipperDouble(Double):
         with self._lock:
             begin = self._begin()
             seconds = abs(to - self._position) / speed + speed / accel
-            self._end = begin + (seconds if to != self._position else 0.0)
-            self._motion = (self._position, to, begin, self._end)
+            self._motion = Motion(
+                self._position, to, begin, seconds if to != self._position else 0.0
+            )
+            self._end = begin + self._motion.seconds
             self._position = to
         if stop is None:
             self._until(self._end - QUEUE_S)

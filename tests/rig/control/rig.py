@@ -159,29 +159,22 @@ def connected_rig(
 ) -> Rig:
     """A rig whose controller shows the camera what its machine looks like."""
     settings = read_settings(export / "grbl_settings.txt") | {3: 0.0, 11: 0.01}
-    see = _seen(folder, view)
-    return _started(
-        GrblDouble(settings, switch_deg, firmware, angle=angle, see=see), export, folder
-    )
+    return _started(GrblDouble(settings, switch_deg, firmware, angle), export, folder, view)
 
 
 def klipper_rig_of(export: Path, folder: Path, switch_deg: float) -> Rig:
     """A rig whose printer is configured as the build says."""
     settings = printer_settings(export / "klipper.cfg")
-    return _started(
-        KlipperDouble(settings, switch_deg, see=_seen(folder, scene_of)), export, folder
-    )
+    return _started(KlipperDouble(settings, switch_deg), export, folder, scene_of)
 
 
-def _seen(folder: Path, view: Callable[[Machine], bytes]) -> Callable[[Machine], None]:
-    (folder / "view").mkdir()
-    return lambda machine: put(folder / "view" / PICTURE, view(machine))
-
-
-def _started(controller: Any, export: Path, folder: Path) -> Rig:
+def _started(controller: Any, export: Path, folder: Path, view: Callable[[Machine], bytes]) -> Rig:
+    rig = Rig(controller, export, folder)
+    rig.picture.parent.mkdir()
+    controller.see = lambda machine: put(rig.picture, view(machine))
     controller.see(controller.machine)
     controller.start()
-    return Rig(controller, export, folder)
+    return rig
 
 
 def at(

@@ -2,9 +2,9 @@
 
 import io
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from tbcad.rig.control.plan import CameraFault
 from tbcad.rig.control.preflight import look, preflight
 from tbcad.rig.runs import read_run
 from tests.rig.control import exposing_camera
-from tests.rig.control.conftest import Told
+from tests.rig.control.conftest import Told, closed
 from tests.rig.control.exposing_camera import SIZE, radiance
 from tests.rig.control.rig import Rig, connected_rig, events
 
@@ -29,9 +29,7 @@ GOOD = ("--exposure-leds", "1/100", "--exposure-lit", "2")
 @pytest.fixture
 def lit_rig(control_export: Path, tmp_path: Path, switch_deg: float) -> Iterator[Rig]:
     """Whose camera is told the exposure, before LEDs as bright as real ones."""
-    found = connected_rig(control_export, tmp_path, switch_deg, view=radiance)
-    yield found
-    found.controller.close()
+    yield from closed(connected_rig(control_export, tmp_path, switch_deg, view=radiance))
 
 
 def words(rig: Rig, *more: str, stops: str | None = "1") -> list[str]:
@@ -41,10 +39,9 @@ def words(rig: Rig, *more: str, stops: str | None = "1") -> list[str]:
     return [word for word in every if word != "--no-preflight"]
 
 
-def test_exposures_that_will_not_do(lit_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+def test_exposures_that_will_not_do(lit_rig: Rig, cli: Callable[..., Any]) -> None:
     """One exposure for all: the LED is saturated, the object nearly so dark as to be lost."""
-    assert tbcad(words(lit_rig, "--exposure-lit", "0.1")) == 2
-    err = capsys.readouterr().err
+    err = cli(*words(lit_rig, "--exposure-lit", "0.1"), code=2).err
     assert (
         "led_2 at 0.1 s is saturated: peak 100% of the largest number, 100% of 5 highlights" in err
     )
@@ -56,9 +53,8 @@ def test_exposures_that_will_not_do(lit_rig: Rig, capsys: pytest.CaptureFixture[
     assert not lit_rig.controller.machine.lights
 
 
-def test_preflight_only(lit_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    assert tbcad(words(lit_rig, *GOOD, "--preflight-only")) == 0
-    shown = capsys.readouterr()
+def test_preflight_only(lit_rig: Rig, cli: Callable[..., Any]) -> None:
+    shown = cli(*words(lit_rig, *GOOD, "--preflight-only"))
     assert "every exposure will do" in shown.out
     for phase in ("dark at 0.01 s", "led_2 at 0.01 s", "dark_lit at 2 s", "lit at 2 s"):
         assert f"{phase} is good" in shown.err
@@ -80,11 +76,10 @@ def test_each_phase_has_its_exposure(lit_rig: Rig, refused: Told) -> None:
     assert read_run(lit_rig.out).exposures["a_0001_lit"].exposure_s == 2.0
 
 
-def test_camera_on_the_relay_is_looked_at_too(rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+def test_camera_on_the_relay_is_looked_at_too(rig: Rig, cli: Callable[..., Any]) -> None:
     """Its LEDs are at the largest number, and tbcad cannot change that."""
     every = rig.words("--phases", "dark,led_1,lit", "--runs", "b", camera=rig.released())
-    assert tbcad([word for word in every if word != "--no-preflight"]) == 2
-    err = capsys.readouterr().err
+    err = cli(*(word for word in every if word != "--no-preflight"), code=2).err
     assert "object turned by 180 degrees" in err
     assert "run b, stop 2 at" in err
     assert "led_1 is saturated" in err

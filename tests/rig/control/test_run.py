@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -19,11 +20,11 @@ from tests.rig.control.conftest import Told
 from tests.rig.control.rig import ALL, Rig, check_every_photograph, events
 
 
-def test_every_photograph_of_a_run(either_rig: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    assert tbcad(either_rig.words()) == 0
+def test_every_photograph_of_a_run(either_rig: Rig, cli: Callable[..., Any]) -> None:
+    told = cli(*either_rig.words()).out
     check_every_photograph(either_rig.out, ALL)
     assert events(either_rig.out) == ["started", *["taken"] * ALL, "finished"]
-    assert capsys.readouterr().out.startswith(f"COMPLETE: {ALL} of {ALL} photographs")
+    assert told.startswith(f"COMPLETE: {ALL} of {ALL} photographs")
 
 
 def test_what_the_controller_is_sent(rig: Rig) -> None:
@@ -93,11 +94,10 @@ def test_release_that_brings_no_photograph(rig: Rig, stopped: Told) -> None:
 
 
 def test_operator_is_asked(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, cli: Callable[..., Any]
 ) -> None:
     words = [word for word in rig.words("--phases", "dark", stops="1") if word != "--yes"]
-    assert tbcad(words) == 2
-    assert "say --yes" in capsys.readouterr().err
+    assert "say --yes" in cli(*words, code=2).err
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
     asked: list[str] = []
 
@@ -106,23 +106,21 @@ def test_operator_is_asked(
         return len(asked) != 2
 
     monkeypatch.setattr("typer.confirm", confirm)
-    assert tbcad(words) == 1
+    assert "stopped: the operator did not go on" in cli(*words, code=1).out
     assert asked == [
         "zero pin out, object straight: done?",
         "turn the object by 180 degrees about z: done?",
     ]
-    assert "stopped: the operator did not go on" in capsys.readouterr().out
     assert tbcad([*words[:-2], "--resume"]) == 0
     assert asked[-1] == "zero pin out, object turned by 180 degrees about z: done?"
     check_every_photograph(rig.out, 2)
 
 
 def test_dry_run_needs_no_machine(
-    control_export: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    control_export: Path, tmp_path: Path, cli: Callable[..., Any]
 ) -> None:
     out = tmp_path / "run"
-    assert tbcad(["run", str(control_export), "--dry-run", "--out", str(out), "--stops", "3"]) == 0
-    text = capsys.readouterr().out
+    text = cli("run", control_export, "--dry-run", "--out", out, "--stops", "3").out
     assert text.startswith("12 photographs at 2 positions would be taken")
     assert "dark, led_1, led_2, led_3, led_4, lit" in text
     assert "1.8 MB of disk" in text

@@ -8,7 +8,6 @@ filled up to one size.
 
 import io
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -52,18 +51,13 @@ def jpeg(pixels: np.ndarray) -> bytes:
     return data.ljust(PICTURE_BYTES, b"\0")
 
 
-@dataclass
 class SimulatedScene:
     """What is to be seen of a simulated run: nothing at angles that it was not photographed at."""
 
-    folder: Path  # of the run
-    turned: bool = False  # whether the object is turned by 180 degrees
-    _photographed: bool = False  # whether the base was at a stop since it was below all
-    _angle: np.ndarray = field(init=False)
-    _pictures: dict[tuple[bool, int, frozenset[int]], bytes] = field(init=False)
-
-    def __post_init__(self) -> None:
-        run = read_run(self.folder)
+    def __init__(self, folder: Path) -> None:
+        self.turned = False  # whether the object is turned by 180 degrees
+        self._photographed = False  # whether the base was at a stop since it was below all
+        run = read_run(folder)
         every = run.exposures.values()
         stops = {one.frame.stop: one.frame.base_angle_deg for one in every}
         self._angle = np.array([stops[stop] for stop in sorted(stops)])

@@ -88,12 +88,6 @@ def test_worst_and_quantiles(result: CoverageResult) -> None:
     assert np.all((low < middle) & (middle < high))
 
 
-def test_builds_without_errors_are_all_good(halves: EdgeModels) -> None:
-    result = simulate(MonteCarloCase(halves, Errors(), 1), 2)
-    assert result.offset.max() < 1e-9
-    assert estimate_yield(result.worst, 60.0).share == 1
-
-
 def test_yield_and_its_interval() -> None:
     """By scipy; one that R. G. Newcombe, Stat. Med. 17 (1998) 857-872, table I, method 3 has."""
     for good, count in ((0, 10), (81, 263), (1, 29), (10, 10)):
@@ -153,6 +147,12 @@ def test_what_one_build_or_one_shell_has_in_common() -> None:
     isotropic, other = draw(Errors(scale_isotropic=Error(0.01)), 1, range(3), M)
     assert np.all(isotropic.scale == isotropic.scale[:, :1])
     assert np.all(isotropic.scale != other.scale)
+    thick, large = (
+        draw(Errors(**{kind: Error(0, 0.03)}), 1, range(1), M)
+        for kind in ("coating", "sphere_radius")
+    )
+    assert np.all(thick[0].radius == large[0].radius)
+    assert np.all(thick[0].radius == 0.03)
 
 
 MIXED = Errors(

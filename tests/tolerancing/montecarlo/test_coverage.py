@@ -1,6 +1,7 @@
 """What the fast model makes of one half; tests/validation holds it against other means."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -86,10 +87,20 @@ def test_errors_larger_than_a_mirror_are_refused(halves: EdgeModels) -> None:
         coverage(halves, draws)
 
 
-@pytest.mark.parametrize("size", [1e-6, 1e-3, 0.1])
-def test_same_minimum_where_only_that_is_asked(halves: EdgeModels, size: float) -> None:
+SPHERES = ("sphere_centre", "sphere_radius", "camera_shift", "facets")
+
+
+@pytest.mark.parametrize(
+    ("kinds", "size"),
+    [
+        *product([SPHERES], [1e-6, 1e-3, 0.1]),
+        *product([("sphere_centre", "waviness")], [1e-4, 2e-3]),
+    ],
+)
+def test_same_minimum_where_only_that_is_asked(
+    halves: EdgeModels, kinds: tuple[str, ...], size: float
+) -> None:
     """Parts of edges that are passed over change no bit of it."""
-    kinds = ("sphere_centre", "sphere_radius", "camera_shift", "facets")
     errors = Errors(**{kind: Error(size) for kind in kinds}, scale_axis=Error(size / 20))
     draws = draw(errors, 5, range(4), len(halves[0]))
     whole, worst = (coverage(halves, draws, only) for only in (False, True))

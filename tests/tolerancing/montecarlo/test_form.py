@@ -142,11 +142,3 @@ def test_wavy_mirrors_by_brute_force(
         slow = bisected_coverage(array, drawn, k, worst, heights, ways=720)
         assert fast[k, worst] == pytest.approx(slow, abs=0.01)
         assert fast[k, worst] < 60.4
-
-
-@pytest.mark.parametrize("size", [1e-4, 2e-3])
-def test_same_minimum_where_only_that_is_asked(halves: EdgeModels, size: float) -> None:
-    errors = Errors(sphere_centre=Error(size), waviness=Error(size))
-    for half, drawn in zip(halves, draw(errors, 5, range(3), len(halves[0])), strict=True):
-        whole, worst = (mirror_coverage(half, drawn, only).diameter for only in (False, True))
-        assert worst.min(axis=1) == pytest.approx(whole.min(axis=1), abs=1e-9)

@@ -11,32 +11,17 @@ from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import (
     MISSING_VARIANCE,
     RING_SHARE,
-    ShellDraws,
-    SmoothField,
     WarpMap,
     draw,
-    draw_kinds,
     mirror_points,
-    pivots,
-    shell_error_shapes,
     smooth_field,
 )
-from tbcad.tolerancing.montecarlo.edge_model import (
-    EdgeModel,
-    EdgeModels,
-    surface_tables,
-    warp_maps_of,
-)
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, surface_tables, warp_maps_of
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
+from tests.tolerancing.exact_builds import drawn, warp_fields
 
 SLA = Errors(warp=Error(0.0346, length=50.0))
 DRAWS = 20_000
-
-
-def moved_by(half: EdgeModel, warp: WarpMap, displacement: np.ndarray) -> np.ndarray:
-    """Centres, radii and astigmatism (m, 6) that displacements (m, q, 3) of points lead to."""
-    along = np.einsum("mqx,mqx->mq", displacement, warp.normal)
-    return np.einsum("mkq,mq->mk", warp.fit, along)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +43,8 @@ def test_whole_movements_are_followed_exactly(halves: EdgeModels, warp: WarpMap)
         (lambda x: np.cross(turn, x), 0.0),
         (lambda x: 2e-3 * x, 2e-3),
     ):
-        found = moved_by(half, warp, move(points))
+        # Centres, radii and astigmatism (m, 6) that displaced points lead to.
+        found = np.einsum("mkq,mqx,mqx->mk", warp.fit, move(points), warp.normal)
         assert found[:, :3] == pytest.approx(move(centre), abs=1e-9)
         assert found[:, 3] == pytest.approx(growth * radius, abs=1e-9)
         assert np.abs(found[:, 4:]).max() < 1e-9
@@ -96,27 +82,15 @@ def test_without_length_it_is_each_mirrors_own_error(halves: EdgeModels) -> None
     assert not warped.form.any()
 
 
-def fields_of(
-    halves: EdgeModels, errors: Errors, builds: range
-) -> tuple[list[SmoothField], np.ndarray, tuple[ShellDraws, ShellDraws]]:
-    """Of both halves the fields, their random numbers (s, 2, K, 3), and the draws."""
-    chosen = pivots(halves[0].apex, errors.warp.length)
-    fields = [smooth_field(half.apex, errors.warp.length, chosen) for half in halves]
-    shapes = shell_error_shapes(len(halves[0]), len(chosen))
-    numbers = draw_kinds(errors, 5, builds, shapes)["warp"]
-    maps = warp_maps_of(halves, errors)
-    return fields, numbers, draw(errors, 5, builds, len(halves[0]), maps)
-
-
 def test_the_foot_goes_along_with_the_mirrors_near_it(halves: EdgeModels) -> None:
     """By the field at the place of the foot below each."""
     half, m = halves[0], len(halves[0])
-    fields, numbers, draws = fields_of(halves, SLA, range(1))
+    fields, numbers = warp_fields(halves, SLA, range(1))
     foot, footed = half.table[-1], half.pairs.footed
     apex = half.apex[footed]
     below = apex - ((apex - foot[:3]) @ foot[3:6])[:, None] * foot[3:6]
     wanted = fields[0].basis(below) @ numbers[0, 0] @ foot[3:6]
-    moved = surface_tables(half, draws[0])[0, m + 2 :, :3] - foot[:3]
+    moved = surface_tables(half, drawn(halves, SLA, range(1))[0])[0, m + 2 :, :3] - foot[:3]
     assert 0 < len(footed) < m
     assert moved == pytest.approx(wanted[:, None] * foot[3:6], abs=1e-12)
 
