@@ -80,9 +80,10 @@ def shells(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 
 
 def test_calibrated_photographs_give_the_views_of_a_perfect_machine(loop: Loop) -> None:
-    perfect = loop.quality("perfect", "drawing")
-    assert abs(loop.quality("run", "calibration") - perfect) < ALLOWED
-    assert abs(loop.quality("run", "truth") - perfect) < ALLOWED
+    """Weight puts balls elsewhere, so their views may be better than those of the perfect one."""
+    perfect, truth = loop.quality("perfect", "drawing"), loop.quality("run", "truth")
+    assert abs(loop.quality("run", "calibration") - truth) < ALLOWED
+    assert truth > perfect - ALLOWED
     assert loop.quality("run", "drawing") < perfect - 2 * ALLOWED
 
 

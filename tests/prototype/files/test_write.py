@@ -44,7 +44,14 @@ def test_steps_of_assembly_take_exactly_the_list_of_parts(folder: Path) -> None:
 
 def test_all_files_are_there(folder: Path, record: dict[str, Any]) -> None:
     own = {part[kind] for part in record["parts"] for kind in ("step", "stl", "3mf")}
-    tables = {"balls.csv", "stops.csv", "rotation_plan.csv", "rotation_plan.nc", "bom.csv"}
+    tables = {
+        "balls.csv",
+        "stops.csv",
+        "sag.csv",
+        "rotation_plan.csv",
+        "rotation_plan.nc",
+        "bom.csv",
+    }
     tables |= {"plate_holes.csv", "wiring.csv", "grbl_settings.txt", "klipper.cfg"}
     tables |= {"rotation_plan_klipper.gcode"}
     sheets = [*record["drawings"], *record["caps"]]

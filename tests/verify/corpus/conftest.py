@@ -29,6 +29,7 @@ PROTOTYPE_SETTINGS = (
     "camera.width_px=416",
     "camera.height_px=310",
     "mesh.structure_error_mm=0.03",
+    "prototype.largest_ball_mm=60",
 )
 
 

@@ -5,6 +5,7 @@ import pytest
 from tbcad_verify.mesh.mesh import indexed_mesh
 from tbcad_verify.prototype.bricks import POISSON, STEP_MM, Bricks, fill_bricks, shapes
 from tbcad_verify.prototype.sag_checks import _without_motions
+from tbcad_verify.record.prototype import SagTable
 from trimesh.creation import box
 
 LENGTH, SIDE = 200.0, 20.0
@@ -53,3 +54,13 @@ def test_motions_of_the_whole_base_are_taken_out() -> None:
     moved = shift + np.cross(turn, centre)
     assert np.abs(_without_motions(moved, centre)).max() < 1e-12
     assert np.abs(_without_motions(random.standard_normal((4, 6, 3)), centre)).max() > 0.1
+
+
+def test_a_table_of_other_stops_or_balls_is_not_used() -> None:
+    pairs = {"stop": [*"1122"], "ball": [*"1212"]}
+    named = [name for name in SagTable.model_fields if name.endswith("_mm")]
+    table = SagTable.model_validate(pairs | dict.fromkeys(named, [*"0123"]))
+    moved = table.moved((2, 2, 3))
+    assert moved is not None
+    assert moved[0, 1, 0].tolist() == [2.0, 2.0, 2.0]
+    assert table.moved((4, 1, 3)) is None
