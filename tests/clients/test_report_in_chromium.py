@@ -13,6 +13,7 @@ from tests.clients.browser import Browser
 pytestmark = [pytest.mark.clients, pytest.mark.slow]
 
 SMALL = ("--set", "camera.width_px=416", "--set", "camera.height_px=310")
+BALLS = ("--set", "prototype.largest_ball_mm=60")  # else all are caps
 TEXT = "document.getElementById('{}').textContent"
 # Middle of an element in the window, which is moved so that it is in sight.
 MIDDLE = """(() => {{
@@ -41,7 +42,7 @@ MIRROR = """(() => {
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small design with both parts, a capture, and a report with it."""
     folder = tmp_path_factory.mktemp("report") / "exports"
-    assert run(["build", "--n", "6", *SMALL, "--out", str(folder), "--quiet"]) == 0
+    assert run(["build", "--n", "6", *SMALL, *BALLS, "--out", str(folder), "--quiet"]) == 0
     capture = folder.parent / "capture"
     assert run(["capture", str(folder), "--out", str(capture)]) == 0
     page = folder.parent / "with_capture.html"
