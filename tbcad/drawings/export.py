@@ -57,7 +57,7 @@ class DrawnExport:
     def source(self, step: str) -> tuple[str, str]:
         """Two lines of notes: the file of a shape, and the beginning of its SHA-256."""
         digest = self.manifest.files[step].sha256[:12]
-        return f"Shape and what has no size here: {step},", f"sha256 {digest}..."
+        return f"Undimensioned geometry per {step},", f"sha256 {digest}..."
 
 
 def read_export(folder: Path) -> DrawnExport:

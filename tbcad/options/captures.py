@@ -127,7 +127,7 @@ class CaptureOptions(Call):
     up: UpOption = None
     unit: UnitOption = None
     out: Annotated[AnyPath | None, typer.Option("--out", "-o")] = None
-    """Folder for all files; replaced as a whole or not at all. By default captures/ with the name
+    """Folder for all files; replaced atomically. By default captures/ with the name
     of the object, such as captures/knot; from Python none."""
     fit: bool = False
     """Move and scale the object into the capture sphere."""

@@ -86,7 +86,7 @@ class MergeOptions(Call):
     exports: ExportsOption[AnyPath] = None
     _: KW_ONLY
     out: Annotated[AnyPath | None, typer.Option("--out", "-o")] = None
-    """Folder for all files; replaced as a whole or not at all. By default captures/ with the name
+    """Folder for all files; replaced atomically. By default captures/ with the name
     of the run, such as captures/first."""
     vignetting: Literal["off", "cos4"] = "cos4"
     """cos4: make good the natural loss of light toward the picture's edge; off: the photographs are

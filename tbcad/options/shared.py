@@ -25,7 +25,7 @@ Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE"
 Out = Annotated[Place, typer.Option("--out", "-o")]
 """Folder for the files; other files in it stay."""
 OutReplaced = Annotated[Place, typer.Option("--out", "-o")]
-"""Folder for all files; replaced as a whole or not at all."""
+"""Folder for all files; replaced atomically."""
 OutPicture = Annotated[Place, typer.Option("--out", "-o")]
 """PNG file to write."""
 JsonResult = Annotated[bool, typer.Option("--json")]
@@ -81,7 +81,7 @@ MethodOfView = Annotated[
     ),
 ]
 Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS")]
-"""Dask scheduler, for example tcp://host:8786 (pip install 'tbcad\\[cluster]'); by default all
+"""Dask scheduler, for example tcp://host:8786 (pip install 'tbcad[cluster]'); by default all
 cores of this machine."""
 
 

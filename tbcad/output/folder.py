@@ -1,4 +1,4 @@
-"""The output folder, replaced as a whole or not at all, and only by content of the same kind.
+"""The output folder, replaced atomically, and only by content of the same kind.
 
 New content is written into a hidden folder beside the old one, which its writer locks; then both
 are exchanged by one system call. Where a system has no such call, the old one is first moved aside,

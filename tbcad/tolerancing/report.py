@@ -316,7 +316,7 @@ def _coverage_map(u: Floats, low: Floats) -> PlotPanel:
     from_zenith = np.degrees(np.arccos(np.clip(u[:, 2], -1, 1)))
     horizontal = np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-12)
     x, y = from_zenith * u[:, 0] / horizontal, from_zenith * u[:, 1] / horizontal
-    dots = Series("", x, y, ".", low, f"coverage that {LOW_SHARE:.0%} do not reach, mm")
+    dots = Series("", x, y, ".", low, f"{LOW_SHARE * 100:.0f}th percentile of coverage, mm")
     along_x, along_y = (f"angle from the zenith along {axis}, degrees" for axis in "xy")
     title = "Virtual cameras, the zenith in the middle"
     return PlotPanel(title, along_x, along_y, (dots,))

@@ -91,7 +91,7 @@ def planned(options: BuildOptions) -> BuildPlan:
 def build(options: BuildOptions) -> Build:
     """Compute the mirrors, write all files into a folder, verify them, and write report.html.
 
-    The folder is replaced as a whole or not at all. A design may also be a spec.
+    The folder is replaced atomically. A design may also be a spec.
 
     Raises:
         InputError: the folder cannot be replaced, or the spec is not allowed; nothing is written.

@@ -3,8 +3,10 @@
 import tomllib
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import typer
+from typer.core import TyperCommand
 from typer.models import CommandInfo
 
 HEADINGS = {
@@ -41,9 +43,18 @@ def _name(command: CommandInfo) -> str:
     return str(command.name or getattr(command.callback, "__name__", ""))
 
 
+class Plain(TyperCommand):
+    """A command with help in plain text: option names and types of any length in 80 columns."""
+
+    def __init__(self, *arguments: Any, **given: Any) -> None:
+        """As TyperCommand, but without markup."""
+        super().__init__(*arguments, **{**given, "rich_markup_mode": None})
+
+
 def add_examples(app: typer.Typer, words: tuple[str, ...] = ()) -> None:
-    """Put its examples at the end of the help of every command; one without is a fault of tbcad."""
+    """Help in plain text with examples for every command; one without is a fault of tbcad."""
     for command in app.registered_commands:
+        command.cls = Plain
         command.epilog = examples_text(" ".join((*words, _name(command))))
     for group in app.registered_groups:
         if group.typer_instance is not None:
@@ -51,7 +62,7 @@ def add_examples(app: typer.Typer, words: tuple[str, ...] = ()) -> None:
 
 
 def examples_text(command: str) -> str:
-    """The examples of a command, in Markdown: each a paragraph with its comment."""
+    """The examples of a command, each with its comment below it, as they stand."""
     told = examples()[command].items()
-    lines = [f"`{f'tbcad {command} {words}'.strip()}` - {about}" for words, about in told]
-    return "\n\n".join(["**Examples**", *lines])
+    lines = [f"  {f'tbcad {command} {words}'.strip()}\n      {about}" for words, about in told]
+    return "\n".join(["\b", "Examples:", *lines])

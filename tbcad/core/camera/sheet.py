@@ -204,9 +204,9 @@ def sheet_lines(
 ) -> list[str]:
     """The verdict, what to buy by, and the first candidates; lines of at most 80 columns."""
     good = [one for one in found if not one.faults]
-    verdict = f"{len(good)} of {len(found)} cameras do with a lens of the list"
-    if not good:
-        verdict = f"no camera of the list does: {found[0].faults[0]}" if found else "no camera"
+    verdict = f"{len(good)} of {len(found)} listed cameras meet the requirements"
+    if found and not good:
+        verdict = f"no listed camera meets the requirements: {found[0].faults[0]}"
     return [
         verdict,
         f"sensor    {needed.width_px} x {needed.height_px} pixels or more over "

@@ -222,7 +222,7 @@ def _recovered_text(
         if kind.name == BESIDES:
             off = norm((kind.recovered - kind.injected).reshape(-1, 3))
             lines.append(
-                f"true errors of the centres, besides a motion and growth of all: "
+                f"true errors of the centres after similarity alignment: "
                 f"{np.median(off):.1f} um (median), {off.max():.1f} um (largest)"
             )
     return "\n".join(textwrap.fill(line, WIDTH, subsequent_indent="  ") for line in lines)

@@ -279,7 +279,7 @@ def run_machine(options: RunOptions) -> Outcome:
             "moonraker:http://HOST for Klipper, or look at what would be done with --dry-run"
         )
     if options.ask is None:
-        raise InputError("nobody can be asked to turn the object: give ask, or say --yes")
+        raise InputError("no way to confirm the turn of the object: give ask, or use --yes")
     out, note, port, ask = Path(options.out), options.progress, options.port, options.ask
     plan, chosen = _prepared(options)
     check_camera_name(options.camera)

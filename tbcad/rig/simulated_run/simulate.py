@@ -149,7 +149,7 @@ def write_run(
     out: Path,
     progress: Progress,
 ) -> None:
-    """Photograph all frames and write a run's folder, as a whole or not at all.
+    """Photograph all frames and write a run's folder, atomically.
 
     The runs are the prototype, or both cameras of the shell. InputError: the folder holds
     something, or cannot be written.

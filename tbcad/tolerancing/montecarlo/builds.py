@@ -63,7 +63,7 @@ class CoverageResult(CameraCoverage):
         return np.asarray(np.argmin(self.coverage, axis=1))
 
     def quantiles(self, shares: Sequence[float]) -> Floats:
-        """Coverage, mm, (k, v), that k shares of the builds do not reach at each camera."""
+        """Quantiles of coverage over the builds, mm, of k shares at each camera, (k, v)."""
         return np.asarray(np.quantile(self.coverage, shares, axis=0))
 
 

@@ -75,7 +75,7 @@ def test_a_broken_list(folder: Path, cli: Command) -> None:
 
 def test_lines_of_the_sheet(cli: Command) -> None:
     lines = cli("camera", "--n", "6").out.splitlines()
-    assert "cameras do with a lens of the list" in lines[0]
+    assert "listed cameras meet the requirements" in lines[0]
     assert all(len(line) <= 80 for line in lines)
 
 
@@ -126,7 +126,7 @@ def test_a_camera_that_does_not_fit_is_refused_with_one_that_does(
 def test_a_sensor_that_no_camera_has(cli: Command) -> None:
     large = ("--set", "width_px=32768", "--set", "height_px=24000")
     out = cli("camera", "--n", "6", *large, code=1).out
-    assert out.startswith("no camera of the list does: ")
+    assert out.startswith("no listed camera meets the requirements: ")
     assert "pixels across the mirrors" in out
 
 

@@ -210,8 +210,8 @@ def run(
         raise InputError("--json is about --dry-run: leave it out, or add --dry-run")
     if options.port and not yes and not sys.stdin.isatty():
         raise InputError(
-            "nobody can be asked to turn the object, for the input is no terminal: say --yes if "
-            "the machine is ready"
+            "no interactive terminal to confirm the turn of the object: use --yes if the machine "
+            "is ready"
         )
     from tbcad.app.api import run as photograph
     from tbcad.rig.control.selection import outcome_lines, preflight_lines

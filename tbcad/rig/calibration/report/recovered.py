@@ -29,7 +29,7 @@ from tbcad.types import Floats, Ints
 MICROMETRES, MILLI = 1000.0, 1000.0
 SIGMAS = 2.0
 LENS = (Block.FOCAL, Block.PRINCIPAL, Block.DISTORTION)
-BESIDES = "centres besides a motion and growth of all"
+BESIDES = "centres after similarity alignment"
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def recovered_table(kinds: tuple[Kind, ...]) -> Table:
 
 
 def _sphere_sigmas(result: MachineCalibration, rest: Floats) -> tuple[Floats, Floats]:
-    """Of centres and radii, mm, (k, 4), and of centres besides a motion and growth of all."""
+    """Of centres and radii, mm, (k, 4), and of centres after similarity alignment."""
     slopes = base_slopes(result.found.prior, result.found.values).matrix(result.found.prior)
     covariance = np.asarray(slopes @ (result.found.covariance @ slopes.T))
     sigma = np.sqrt(np.diag(covariance)).reshape(-1, 4)
