@@ -29,7 +29,7 @@ SIZES_PX = (8, 4096)
 
 
 @dataclass(frozen=True)
-class ExportOptions(Call):
+class DatasetOptions(Call):
     """A capture, for which program it is written, and what of it."""
 
     capture: Capture[AnyPath]

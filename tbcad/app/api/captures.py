@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tbcad.options.call import keywords
-from tbcad.options.captures import CaptureOptions, ExportOptions
+from tbcad.options.captures import CaptureOptions, DatasetOptions
 from tbcad.options.checks import check_is_capture, check_is_export, check_is_object
 from tbcad.options.shared import AnyPath
 
@@ -165,8 +165,8 @@ def relight(
         return relit(LightField.read(folder), reflectance, environment).field
 
 
-@keywords(ExportOptions)
-def dataset(options: ExportOptions) -> dict[str, Any]:
+@keywords(DatasetOptions)
+def dataset(options: DatasetOptions) -> dict[str, Any]:
     """Write the light field of a capture as data that another program reads.
 
     Returns:
@@ -180,7 +180,7 @@ def dataset(options: ExportOptions) -> dict[str, Any]:
     options.check()
     place, out, exports = Path(options.capture), Path(options.out), options.exports
     check_is_capture(place)
-    from tbcad.light.datasets.export import write_dataset, write_scene
+    from tbcad.light.datasets.write import write_dataset, write_scene
     from tbcad.light.simulate.capture.files import captured_scene
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.output.folder import check_replaceable, replacing
@@ -199,6 +199,3 @@ def dataset(options: ExportOptions) -> dict[str, Any]:
             record = write_dataset(folder, source, scene, options)
         write_manifest(folder, "dataset")
     return record
-
-
-export = dataset  # as it was called at first

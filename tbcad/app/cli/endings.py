@@ -102,7 +102,7 @@ _PARAMETER, _OPTION, _LIKELY = "param", "option_name", "possibilities"
 _EXTRA = re.compile(r"^Got unexpected extra argument\(s\) \(")
 
 
-RENAMED = {"inspection": "order"}  # commands, as they were called and are
+RENAMED = {"inspection": "order", "export": "dataset"}  # commands, as they were called and are
 
 
 def check_is_not_renamed(arguments: Sequence[str]) -> None:

@@ -17,7 +17,7 @@ HEADINGS = {
     "Order and assemble": ("order", "parts", "drawings", "assembly"),
     "Run the machine": ("run", "intrinsics", "calibrate", "merge", "as-built"),
     "Simulate and analyse": ("capture", "simulate-run", "sag", "tolerance", "study"),
-    "Look at light fields": ("reconstruct", "show", "view", "refocus", "export"),
+    "Look at light fields": ("reconstruct", "show", "view", "refocus", "dataset"),
 }
 
 

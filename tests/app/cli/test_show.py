@@ -69,7 +69,7 @@ def test_a_light_field_is_served_until_ctrl_c(captured: Path) -> None:
 @pytest.mark.parametrize("target", ["nerfstudio", "colmap", "ngp-rays", "rays"])
 def test_the_same_bytes_again(captured: Path, tmp_path: Path, target: str, cli: Command) -> None:
     for name in ("one", "other", "one"):  # replaced, folders and all
-        cli("export", captured, "--to", target, "--every", "20", "--out", tmp_path / name)
+        cli("dataset", captured, "--to", target, "--every", "20", "--out", tmp_path / name)
     assert contents(tmp_path / "one") == contents(tmp_path / "other")
     listed = json.loads((tmp_path / "one" / "manifest.json").read_text())["files"]
     assert listed.keys() | {"manifest.json"} == contents(tmp_path / "one").keys()
@@ -77,7 +77,7 @@ def test_the_same_bytes_again(captured: Path, tmp_path: Path, target: str, cli: 
 
 def test_prints_what_is_in_the_record(captured: Path, tmp_path: Path, cli: Command) -> None:
     out = tmp_path / "data"
-    export = ["export", captured, "--to", "colmap", "--every", "9", "--size", "48", "--out", out]
+    export = ["dataset", captured, "--to", "colmap", "--every", "9", "--size", "48", "--out", out]
     record = json.loads(cli(*export, "--json").out)
     assert record == json.loads((out / "dataset.json").read_text())
     assert record["size_px"] == 48
@@ -99,11 +99,11 @@ def test_prints_what_is_in_the_record(captured: Path, tmp_path: Path, cli: Comma
 
 def test_reprojection_falls_with_the_error_of_the_pinhole(captured: Path, tmp_path: Path) -> None:
     """A point in the sphere is off by at most the central error, in pixels of the picture."""
-    figures = tbcad.export(captured, "nerfstudio", out=tmp_path / "data", every=5, size=60)
+    figures = tbcad.dataset(captured, "nerfstudio", out=tmp_path / "data", every=5, size=60)
     most = figures["fit"]["central_error_at_capture_radius_mm"]["max"]
     errors = figures["reprojection_error_px"]
     assert 0 < errors["median"] < errors["percentile_95"] < 2 * most  # pixels are 1 mm or so
-    fine = tbcad.export(captured, "nerfstudio", out=tmp_path / "fine", every=5, size=120)
+    fine = tbcad.dataset(captured, "nerfstudio", out=tmp_path / "fine", every=5, size=120)
     ratio = fine["reprojection_error_px"]["median"] / errors["median"]
     assert ratio == pytest.approx(2, rel=1e-3)
 
@@ -112,12 +112,12 @@ def test_real_captures_come_without_the_object(captured: Path, tmp_path: Path) -
     real = tmp_path / "real"
     shutil.copytree(captured, real)
     (real / "object.npz").unlink()
-    figures = tbcad.export(real, "nerfstudio", out=tmp_path / "data", cameras="a", every=10)
+    figures = tbcad.dataset(real, "nerfstudio", out=tmp_path / "data", cameras="a", every=10)
     assert "reprojection_error_px" not in figures
     names = [path.stem for path in (tmp_path / "data" / "images").iterdir()]
     assert names
     assert all(name.startswith("a") for name in names)
-    by_file = tbcad.export(
+    by_file = tbcad.dataset(
         real / "lightfield.h5", "nerfstudio", out=tmp_path / "file", cameras="a", every=10
     )
     assert by_file == figures
@@ -128,7 +128,7 @@ def test_captures_by_the_prototype(export_folder: Path, tmp_path: Path, cli: Com
     cli("capture", export_folder, "--out", tmp_path / "balls", "--prototype")
     cli("capture", export_folder, "--out", tmp_path / "shell")
     balls, shell = (
-        tbcad.export(tmp_path / name, "colmap", out=tmp_path / f"{name}-data", cameras="a")
+        tbcad.dataset(tmp_path / name, "colmap", out=tmp_path / f"{name}-data", cameras="a")
         for name in ("balls", "shell")
     )
     assert balls["capture"]["geometry"] == "prototype"

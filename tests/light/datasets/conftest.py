@@ -16,7 +16,7 @@ def exported(captured: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     """The folder of each target."""
     parent = tmp_path_factory.mktemp("data")
     for target in TARGETS:
-        assert run(["export", str(captured), "--to", target, "--out", str(parent / target)]) == 0
+        assert run(["dataset", str(captured), "--to", target, "--out", str(parent / target)]) == 0
     return {target: parent / target for target in TARGETS}
 
 

@@ -44,7 +44,7 @@ def shown(built: Path) -> Path:
 @pytest.fixture(scope="module")
 def scenes(built: Path, shown: Path) -> Path:
     out = built.parent / "scene"
-    words = ["export", str(shown), "--to", "mitsuba", "--exports", str(built), "--out", str(out)]
+    words = ["dataset", str(shown), "--to", "mitsuba", "--exports", str(built), "--out", str(out)]
     assert run(words) == 0
     ast.parse((out / "blender.py").read_text(encoding="utf-8"))
     return out

@@ -12,7 +12,7 @@ from tbcad.app.cli.endings import Stopped
 from tbcad.common.screen import stages
 from tbcad.errors import InputError
 from tbcad.options.call import tell_options
-from tbcad.options.captures import CaptureOptions, ExportOptions, Geometry, ReconstructOptions
+from tbcad.options.captures import CaptureOptions, DatasetOptions, Geometry, ReconstructOptions
 from tbcad.options.shared import JsonResult
 
 CAPTURES, BUILT_IN = Path("captures"), "knot"
@@ -77,7 +77,7 @@ WRITTEN = {
 
 
 @command()
-def export(options: ExportOptions, json: JsonResult = False) -> int:
+def dataset(options: DatasetOptions, json: JsonResult = False) -> int:
     """Write virtual cameras of a capture for nerfstudio, COLMAP or instant-ngp, rays, or a scene.
 
     Each mirror's crop is resampled to the picture of a pinhole at the point that its rays come
@@ -98,7 +98,7 @@ def _lines(record: dict[str, Any]) -> Iterator[str]:
     """What is written first, then how well pinholes fit."""
     left_out, size = len(record["left_out"]), record.get("size_px")
     return result_lines(
-        "export",
+        "dataset",
         content=f"{record['rays']} rays" if size is None else f"{size} x {size} pixels each",
         missing=f"; {left_out} mirrors give none" if left_out else "",
         reprojected=record.get("reprojection_error_px"),

@@ -31,7 +31,7 @@ from tbcad.light.simulate.capture.files import chunked
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
-from tbcad.options.captures import ExportOptions
+from tbcad.options.captures import DatasetOptions
 from tbcad.types import Floats, Progress
 
 SCHEMA = "tbcad-dataset/1"
@@ -52,7 +52,7 @@ RAY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
 
 
 def write_dataset(
-    folder: Path, source: LightField, scene: Scene | None, options: ExportOptions
+    folder: Path, source: LightField, scene: Scene | None, options: DatasetOptions
 ) -> dict[str, Any]:
     """Write all files of an export into an empty folder, and return its record.
 
@@ -126,7 +126,7 @@ def _written(
     source: LightField,
     virtual: FittedCameras,
     scene: Scene | None,
-    options: ExportOptions,
+    options: DatasetOptions,
 ) -> dict[str, Any]:
     """Write what the target reads, and return what is in it."""
     progress, detail = options.progress, options.detail
