@@ -291,7 +291,8 @@ def homing_step(machine: AssembledMachine) -> Words:
 @planned("Angle zero")
 def zero_step(machine: AssembledMachine) -> Words:
     """Settings, homing and the trim."""
-    homes = machine.record.controller.firmware == "grblhal"
+    firmware = machine.record.controller.firmware
+    homes, klipper = firmware != "grbl", firmware == "klipper"
     rated = next((row.current_ma for row in machine.wiring if row.signal == "motor"), None)
     return told_words(
         __name__,
@@ -299,8 +300,11 @@ def zero_step(machine: AssembledMachine) -> Words:
         current=machine.record.drive.hold_current_a,
         of_motor=f", {rated / MA_PER_A:.1f} A," if rated else "",
         homes=homes,
+        grbl=not klipper,
+        klipper=klipper,
+        grblhal=firmware == "grblhal",
         by_hand=not homes,
-        unlock=when(homes, "Unlock the controller by $X. "),
+        unlock=when(firmware == "grblhal", "Unlock the controller by $X. "),
         falls=machine.record.power_off.fall_energy_j,
         off=machine.record.power_off,
         home=machine.record.home,

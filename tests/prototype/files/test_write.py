@@ -52,8 +52,7 @@ def test_all_files_are_there(folder: Path, record: dict[str, Any]) -> None:
         "rotation_plan.nc",
         "bom.csv",
     }
-    tables |= {"plate_holes.csv", "wiring.csv", "grbl_settings.txt", "klipper.cfg"}
-    tables |= {"rotation_plan_klipper.gcode"}
+    tables |= {"plate_holes.csv", "wiring.csv", "grbl_settings.txt"}
     sheets = [*record["drawings"], *record["caps"]]
     drawn = {one[kind] for one in sheets for kind in ("pdf", "dxf")}
     assert drawn >= {f"drawing_{part}.pdf" for part in ("plate", "wheel", "upright")}

@@ -33,7 +33,6 @@ BALLS, HOLES, SAG = "balls.csv", "plate_holes.csv", "sag.csv"
 SETTINGS = "grbl_settings.txt"
 CAP, SHEET = "drawing_cap_1.dxf", "drawing_plate.pdf"
 PLATE, WHEEL, LAMP = (f"drawing_{name}.dxf" for name in ("plate", "wheel", "lamp"))
-KLIPPER, CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"
 
 
 def record(path: str, to: object = DROP) -> Job:
@@ -348,28 +347,6 @@ FAILING: Broken = {
             "the play of pin",
         ),
         "home: too short a pin": (record("home/pin", "ROD-4x10"), "does not reach"),
-    },
-    ("klipper", KLIPPER): {
-        "klipper: another angle": (
-            text_of(KLIPPER, r"(?<=: 2 mirrors\n)(.*MOVE=).*?( SPEED)", r"\g<1>5\2", 1),
-            "at 5.0000 deg",
-        ),
-        "klipper: words: pin in": (text_of(KLIPPER, "zero pin out", "zero pin in"), "is none that"),
-    },
-    ("klipper", CONFIG): {
-        f"klipper.cfg: {name}": (text_of(CONFIG, old, new, 1), words)
-        for name, old, new, words in (
-            ("an include", r"\[printer\]", "[include more.cfg]\n[printer]", "include more"),
-            ("a macro", r"\[printer\]", "[gcode_macro PAUSE]\ngcode:\n[printer]", "gcode_macro"),
-            ("nothing to say", r"\[respond\]\n", "", "allowed is"),
-            ("no pause", r"\[pause_resume\]\n", "", "allowed is"),
-            ("a motor that turns back", "dir_pin: ", "dir_pin: !", "dir_pin: !"),
-            ("no pull-up", r"endstop_pin: \^", "endstop_pin: ", "allowed is"),
-            ("a lamp on at once", r"(?s)(.*)value: 0", r"\1value: 1", "value: 1"),
-            ("idle in a minute", r"timeout: \d+", "timeout: 60", "timeout: 60"),
-            ("a driver that is off", "pins: ", "pins: !", "pins: !"),
-            ("a pin for 2", "(step.*)FILL_IN(\n.*)FILL_IN", r"\1PA1\2PA1", "PA1 is there 2"),
-        )
     },
     ("part files", RECORD): {
         f"{name} of the carrier": (record(f"parts/carrier/{key}", to), "carrier has")
