@@ -47,7 +47,7 @@ MIN_PLATE_MM = BRACKET_HIGH_MM + 2.0  # out, of the plate's end
 # Of the switch's roller from the line of its holes: when free, and when the switch trips.
 FREE_MM, TRIP_MM = 19.3, 14.5
 TAB_BEYOND_MM = 0.7  # of the tab beyond where the switch trips
-SWITCH = "SWITCH-SS-5GL2"
+SWITCH = "SWITCH-ROLLER"
 # Of the switch, from the line of its holes: toward the axis to its body's end, outward to the
 # other, half its length; to the roller when fully pressed.
 BODY_IN_MM, BODY_OUT_MM, BODY_HALF_MM = 7.3, 2.9, 9.9
