@@ -80,7 +80,7 @@ def _table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 def _step(step: Step, told: Instructions, pictures: Mapping[str, bytes]) -> Iterator[str]:
     yield f'<section id="{step.key}"><h2>{step.number}. {escape(step.title)}</h2>'
-    tools = "; ".join(told.step_tools[step.key])
+    tools = ", ".join(told.step_tools[step.key])
     needed = escape(f" Tools: {tools}." if tools else "")
     yield f"<p>About {hours_text(told.minutes[step.key])}.{needed}</p>"
     if step.parts:

@@ -30,7 +30,7 @@ from tbcad.prototype.assembly_steps.views import step_picture, whole_picture
 from tbcad.prototype.files.bom import BOUGHT
 from tbcad.version import __version__
 
-NAME = "assembly.pdf"
+NAME, TITLE = "assembly.pdf", "assembly instructions"
 PAPER = A4[1], A4[0]  # upright
 STRIP_MM = 12.0  # height of the title strip of all sheets but the first
 LEFT, RIGHT = LEFT_MM + BESIDE_MM, PAPER[0] - BORDER_MM - BESIDE_MM
@@ -38,6 +38,7 @@ TOP, LOW = PAPER[1] - BORDER_MM - BESIDE_MM, BORDER_MM + STRIP_MM + BESIDE_MM
 HEAD_MM, HEADING_MM, WORDS_MM = 5.0, 3.5, 2.2  # heights of capitals
 LINE, GAP = 1.85, 3.0  # from line to line, over the capitals' height; between blocks, mm
 MARK_MM, BOX_MM = 7.0, 2.6  # room for a number or a box before a text; size of a box
+SLACK_MM = 0.5  # of a sheet that is full
 PICTURE_MM, COVER_MM = (55.0, 120.0), 185.0  # least and greatest heights of a picture
 STRIP = (("Title", 68.0), ("Design", 52.0), ("Drawn by", 36.0), ("Sheet", 24.0))
 PARTS_MM, PARTS = (11.0, 11.0, 40.0, 110.0), ("no.", "qty", "part", "designation")
@@ -55,7 +56,7 @@ class Block:
     height: float  # mm
     draw: Callable[[float], Iterable[Entity]]  # by the height of its upper edge on paper, mm
     keep: bool = False  # on one sheet with what follows
-    fresh: bool = False  # on a new sheet
+    subject: str = ""  # of a new sheet, and of those that follow
 
 
 def write_book(folder: Path, meshes: Sequence[ColouredMesh], design: str) -> None:
@@ -78,12 +79,15 @@ def book(
         *_front(told),
         *_parts(machine, told),
         *(block for step in told.steps for block in _step(machine, told, step, bodies)),
-        *_section("Not drawn", [*_listed(told.not_drawn)]),
     ]
     sheets = list(_sheets(blocks))
     count = 1 + len(sheets)
     cover = _cover(machine, told, bodies, design, count)
-    return [cover, *([*_frame(design, k, count), *one] for k, one in enumerate(sheets, 2))]
+    others = (
+        [*_frame(subject, design, number, count), *drawn]
+        for number, (subject, drawn) in enumerate(sheets, 2)
+    )
+    return [cover, *others]
 
 
 def _cover(
@@ -96,7 +100,7 @@ def _cover(
     """Title, times, the whole machine apart, and the title block of ISO 7200."""
     low = BORDER_MM + TITLE_MM[1] + BESIDE_MM
     title = TitleBlock(
-        title="assembly instructions",
+        title=TITLE,
         design=design,
         item="all",
         quantity=1,
@@ -120,19 +124,17 @@ def _cover(
 
 
 def _front(told: Instructions) -> Iterator[Block]:
-    """What is read before the first step: about, tools, times, and what was tried."""
+    """What is read before the first step: about, tools, times."""
     yield from _section("Before the first step", map(_paragraph, (*told.about, PICTURES)))
     yield from _section("Tools", _listed(told.tools))
     rows = [(str(one.number), one.title, hours_text(told.minutes[one.key])) for one in told.steps]
     total = ("", "all", hours_text(sum(told.minutes.values())))
     yield from _section("Times", map(_paragraph, told.times))
     yield from _table((11.0, 131.0, 30.0), ("no.", "subassembly", "work"), [*rows, total])
-    yield from _section("Tested, and not tested", ())
-    yield from _table((48.0, 124.0), ("with", "how far it was tried"), told.tested)
 
 
 def _parts(machine: AssembledMachine, told: Instructions) -> Iterator[Block]:
-    """The parts list, with the steps that take each part."""
+    """The parts list with the steps that take each part; what is not drawn, and what was tried."""
     yield _heading("Parts", HEADING_MM)
     taken: dict[int, list[int]] = {}
     for step in told.steps:
@@ -145,6 +147,9 @@ def _parts(machine: AssembledMachine, told: Instructions) -> Iterator[Block]:
         made = told.designations[item] if row["from"] == BOUGHT else f"print: {row['what']}"
         rows.append((str(item), str(row["quantity"]), str(row["part"]), made, how))
     yield from _table(LIST_MM, (*PARTS, "in step"), rows)
+    yield from _section("Not drawn", [*_listed(told.not_drawn)])
+    yield from _section("Tested, and not tested", ())
+    yield from _table((48.0, 124.0), ("with", "how far it was tried"), told.tested)
 
 
 def _step(
@@ -154,10 +159,11 @@ def _step(
     bodies: dict[str, trimesh.Trimesh],
 ) -> list[Block]:
     """A subassembly: parts, tools and time, picture, what is done, torques and fits, checks."""
-    tools = "; ".join(told.step_tools[step.key])
+    title = f"{step.number}. {step.title}"
+    tools = ", ".join(told.step_tools[step.key])
     time = f"About {hours_text(told.minutes[step.key])}."
     above = [
-        _heading(f"{step.number}. {step.title}", HEADING_MM, fresh=True),
+        _heading(title, HEADING_MM, title),
         _paragraph(f"{time} Tools: {tools}." if tools else time),
         *(_table(PARTS_MM, PARTS, told.uses(step)) if step.parts else ()),
     ]
@@ -171,7 +177,7 @@ def _step(
 
 def _picture_height(others: float) -> float:
     """Such that a step has one sheet, if its words leave room for a picture."""
-    rest = TOP - LOW - others - 2 * GAP
+    rest = TOP - LOW - others - 2 * GAP - SLACK_MM
     return min(rest, PICTURE_MM[1]) if rest >= PICTURE_MM[0] else sum(PICTURE_MM) / 2
 
 
@@ -184,14 +190,14 @@ def _listed(texts: Iterable[str]) -> Iterator[Block]:
     return (_item(text, "-") for text in texts)
 
 
-def _heading(text: str, height: float, fresh: bool = False) -> Block:
+def _heading(text: str, height: float, subject: str = "") -> Block:
     def draw(top: float) -> Iterator[Entity]:
         base = top - GAP - height
         yield Text(Layer.FRAME, (LEFT, base), height, drawable(text))
         rule = Layer.FRAME if height >= HEADING_MM else Layer.DIMENSIONS
         yield Line(rule, (LEFT, base - height / 2), (RIGHT, base - height / 2))
 
-    return Block(2 * GAP + 1.5 * height, draw, keep=True, fresh=fresh)
+    return Block(2 * GAP + 1.5 * height, draw, True, subject)
 
 
 def _paragraph(text: str) -> Block:
@@ -271,30 +277,31 @@ def _placed(drawn: Sequence[Entity], height: float) -> Block:
     return Block(height + 2 * GAP, draw)
 
 
-def _sheets(blocks: Iterable[Block]) -> Iterator[list[Entity]]:
-    """Blocks on sheets, one below the other."""
-    y, drawn, kept = TOP, list[Entity](), list[Block]()
+def _sheets(blocks: Iterable[Block]) -> Iterator[tuple[str, list[Entity]]]:
+    """Blocks on sheets, one below the other, each sheet with its subject."""
+    y, drawn, kept, subject = TOP, list[Entity](), list[Block](), TITLE
     for block in blocks:
         kept.append(block)
         if block.keep:
             continue
         height = sum(one.height for one in kept)
-        if drawn and (y - height < LOW or any(one.fresh for one in kept)):
-            yield drawn
+        if drawn and (y - height < LOW or kept[0].subject):
+            yield subject, drawn
             y, drawn = TOP, []
+        subject = kept[0].subject or subject
         for one in kept:
             drawn += one.draw(y)
             y -= one.height
         kept = []
-    yield drawn
+    yield subject, drawn
 
 
-def _frame(design: str, number: int, count: int) -> Iterator[Entity]:
+def _frame(subject: str, design: str, number: int, count: int) -> Iterator[Entity]:
     """The border, and a strip with what ISO 7200 asks of a sheet that follows."""
     yield rectangle((LEFT_MM, BORDER_MM, PAPER[0] - BORDER_MM, PAPER[1] - BORDER_MM), Layer.FRAME)
-    values = ("assembly instructions", design, f"tbcad {__version__}", f"{number} of {count}")
+    values = (subject, design, f"tbcad {__version__}", f"{number} of {count}")
     left = LEFT_MM
     for (label, width), value in zip(STRIP, values, strict=True):
         box: Box = (left, BORDER_MM, left + width, BORDER_MM + STRIP_MM)
-        yield from cell(box, label, value)
+        yield from cell(box, label, drawable(value))
         left += width

@@ -48,6 +48,7 @@ def instructions(machine: AssembledMachine) -> Instructions:
     """The instructions for a prototype. InputError: as `assembly_steps`."""
     words, steps = _words(), assembly_steps(machine)
     kinds = {machine.kind(part) for part in machine.bill.items}
+    each = ", ".join(f"{what} {value:g}" for what, value in words["minutes"].items())
     hours = totals(machine.bill.rows)["print_hours"]
     return Instructions(
         about=tuple(words["about"]),
@@ -58,7 +59,7 @@ def instructions(machine: AssembledMachine) -> Instructions:
         steps=steps,
         designations={int(row["item"] or 0): designation(row) for row in machine.bill.rows},
         minutes={step.key: work_minutes(machine, step) for step in steps},
-        times=tuple(text.format(print_hours=hours) for text in words["times"]),
+        times=tuple(text.format(print_hours=hours, minutes=each) for text in words["times"]),
         step_tools={step.key: tuple(dict.fromkeys(_tools(machine, step))) for step in steps},
         tested=tuple((what, result) for what, result in words["tested"]),
         not_drawn=tuple(_not_drawn(machine, steps)),
@@ -73,16 +74,16 @@ def designation(row: Row) -> str:
 def work_minutes(machine: AssembledMachine, step: Step) -> float:
     """Minutes of one person for a step: each instruction, check, part and hole."""
     each = _words()["minutes"]
-    counts = Counter({"read": len(step.does), "check": len(step.checks)})
+    counts = Counter({"instructions": len(step.does), "checks": len(step.checks)})
     for use in step.parts:
         counts[_work(machine, use)] += use.quantity
         if machine.kind(use.part) == "plates":
-            counts["hole"] += sum(
+            counts["holes"] += sum(
                 "plate" in one.through and machine.kind(one.part) in SCREWED
                 for one in machine.fasteners
             )
     if step.key == "wiring":
-        counts["line"] += len(machine.wiring)
+        counts["lines of wiring"] += len(machine.wiring)
     return float(sum(each.get(what, 0.0) * count for what, count in counts.items()))
 
 
@@ -98,9 +99,9 @@ def _work(machine: AssembledMachine, use: Use) -> str:
     if (kind := machine.kind(use.part)) != OWN:
         return kind
     if not use.bodies or not machine.is_printed(use.bodies[0]):
-        return "ball"
+        return "balls"
     caps = {one.name for one in machine.record.with_role("cap")}
-    return "mirror" if use.bodies[0] in caps else "printed"
+    return "caps" if use.bodies[0] in caps else "printed parts"
 
 
 def _tools(machine: AssembledMachine, step: Step) -> Iterator[str]:
@@ -114,7 +115,8 @@ def _tools(machine: AssembledMachine, step: Step) -> Iterator[str]:
     for use in step.parts:
         part, kind = machine.listed(use.part), machine.kind(use.part)
         if tool := words["step_tools"].get(kind):
-            yield tool.format(nut=f"{part['width_mm']:g}" if part and kind == "nuts" else "")
+            width = f"{part['width_mm']:g}" if part and kind == "nuts" else ""
+            yield from tool.format(nut=width).split(", ")
 
 
 def _not_drawn(machine: AssembledMachine, steps: tuple[Step, ...]) -> Iterator[str]:
