@@ -84,7 +84,7 @@ def work_minutes(machine: AssembledMachine, step: Step) -> float:
             )
     if step.key == "wiring":
         counts["lines of wiring"] += len(machine.wiring)
-    return float(sum(each.get(what, 0.0) * count for what, count in counts.items()))
+    return float(sum(each[what] * count for what, count in counts.items()))
 
 
 def hours_text(minutes: float) -> str:

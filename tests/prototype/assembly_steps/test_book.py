@@ -17,6 +17,7 @@ from tbcad.cad.formats.pdf import drawable, text_width
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.prototype.assembly_steps.book import NAME, PAPER, TITLE, book, write_book
 from tbcad.prototype.assembly_steps.instructions import (
+    _words,
     designation,
     hours_text,
     instructions,
@@ -148,6 +149,8 @@ def test_times_are_sums(machine: AssembledMachine) -> None:
     # Motor 3, pinion 2, a screw 0.8; 1.5 for each instruction and 1 for each check.
     expected = 3 + 2 + 0.8 + 1.5 * len(motor.does) + len(motor.checks)
     assert work_minutes(machine, motor) == pytest.approx(expected)
+    kinds = {part.kind for part in load_parts().values()}
+    assert kinds <= {*_words()["minutes"]}
     assert [hours_text(one) for one in (1.0, 57.0, 58.0, 130.0)] == [
         *("5 min", "55 min", "1 h", "2 h 10 min")
     ]
