@@ -28,6 +28,7 @@ import re
 from collections.abc import Iterable, Iterator
 from importlib.resources import files
 
+from tbcad.cad.formats.checked_files import Row
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import (
@@ -60,6 +61,7 @@ MESSAGE = re.compile(r"M0 \(MSG, (.*?)[,.?]? [Tt]hen resume\)")
 # Not the stepper's enable_pin, which a shutdown takes back. The switch is normally closed to
 # ground: high when pressed. After a day Klipper tells that it is idle, and does no more.
 _TEMPLATE = files("tbcad.prototype") / "files" / "klipper.cfg"
+KLIPPER_PINS = {"home": "endstop_pin", "motor": "step_pin and dir_pin"}
 TRAVEL_STEP_DEG = 0.001  # that the travel is rounded up to
 Setting = tuple[int, float, str]
 
@@ -78,6 +80,18 @@ def controller_files(
         values = settings(drive, motion, angles)
         texts = {PLAN: program, NAME: settings_lines(title, values)}
     return {name: "\n".join(lines) + "\n" for name, lines in texts.items()}
+
+
+def wired(row: Row, motion: MotionSpec) -> Row:
+    """A line of the wiring, for Klipper with the names and commands of klipper.cfg."""
+    if motion.controller != "klipper":
+        return row
+    signal = str(row["signal"])
+    if row["on"]:
+        switch, pin = f"SET_PIN PIN={signal} VALUE=", f"[output_pin {signal}]"
+        output = re.sub(r"coolant|(?<=digital )\d+", pin, str(row["output"]))
+        return {**row, "output": output, "on": f"{switch}1", "off": f"{switch}0"}
+    return {**row, "output": KLIPPER_PINS.get(signal, row["output"])}
 
 
 def settings(drive: Drive, motion: MotionSpec, angles: HomeAngles) -> list[Setting]:

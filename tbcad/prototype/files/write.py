@@ -135,13 +135,14 @@ def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: P
 
 def _write_tables(built: PrototypeModel, folder: Path) -> None:
     layout, motion = built.layout, built.spec.prototype.motion
+    wires = [controllers.wired(row, motion) for row in built.frame.of(Wiring).rows]
     loads = drive_loads(built.drive, base_torques(built.balance, layout.stops.range, motion))
     for name, columns, rows in (
         (BALLS_FILE, tables.BALL_COLUMNS, tables.ball_rows(layout)),
         ("rotation_plan.csv", tables.PICTURE_COLUMNS, tables.picture_rows(layout)),
         ("stops.csv", tables.STOP_COLUMNS, tables.stop_rows(layout, built.balance, loads)),
         ("plate_holes.csv", tables.HOLE_COLUMNS, tables.hole_rows(built.frame.of(Stock))),
-        (WiringRow.FILE, WiringRow.columns(), built.frame.of(Wiring).rows),
+        (WiringRow.FILE, WiringRow.columns(), wires),
     ):
         write_table(folder / name, columns, rows)
     texts = controllers.controller_files(
