@@ -21,7 +21,7 @@ FILLED, CONTEXT = 0.94, 0.45  # share of the room that new parts fill, and of al
 PIECE_MM = 0.4  # on paper, of edges that are tested as one
 # Directions to look from, degrees; their worth, since people look from above and from a corner.
 AZIMUTHS, ELEVATIONS = range(-135, 181, 45), {20: 1.0, 50: 0.95, -25: 0.8, -55: 0.7}
-SQUARE_DEG, SQUARE_WORTH = 90, 0.7  # lines do not tell what is in front
+SQUARE_DEG, SQUARE_WORTH = 90, 0.55  # lines do not tell what is in front
 GRID = 50  # rays along the longer side, to see what is seen from a direction
 DECIMALS = 2  # of a place on paper, mm
 EXPLODED_EYE, APART = (1.0, -1.0, 0.45), 0.5  # share of its place that what stands still is moved
