@@ -39,7 +39,7 @@ def test_edited_paper_is_told_and_refused_only_strictly(
     assert main([str(folder), "-q"]) == 0
     verdict, line = capsys.readouterr().out.splitlines()
     assert verdict.startswith("PASS")
-    assert line.startswith("changed since the build: assembly.pdf, bom.csv, camera.json, drawing_")
+    assert line.startswith("changed since the build: assembly.pdf, bom.csv, camera.json, ")
     assert main([str(folder), "-q", "--strict"]) == 1
     assert capsys.readouterr().out == "FAIL: failed: paper\n"
     change(folder, "plate_holes.csv", lambda data: data + b"\n")
