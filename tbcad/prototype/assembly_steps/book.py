@@ -27,7 +27,7 @@ from tbcad.prototype.assembly_steps.instructions import Instructions, hours_text
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step
 from tbcad.prototype.assembly_steps.views import step_picture, whole_picture
-from tbcad.prototype.files.bom import BOUGHT
+from tbcad.prototype.files.bom import PRINTED
 from tbcad.version import __version__
 
 NAME, TITLE = "assembly.pdf", "assembly instructions"
@@ -144,7 +144,7 @@ def _parts(machine: AssembledMachine, told: Instructions) -> Iterator[Block]:
     for row in machine.bill.rows:
         item = int(row["item"] or 0)
         how = " ".join(map(str, taken.get(item, ())))
-        made = told.designations[item] if row["from"] == BOUGHT else f"print: {row['what']}"
+        made = f"print: {row['what']}" if row["from"] == PRINTED else told.designations[item]
         rows.append((str(item), str(row["quantity"]), str(row["part"]), made, how))
     yield from _table(LIST_MM, (*PARTS, "in step"), rows)
     yield from _section("Not drawn", [*_listed(told.not_drawn)])
