@@ -236,7 +236,7 @@ def _with_base(spec: Spec, **values: object) -> Spec:
 def _keep_out(spec: Spec, layout: PrototypeLayout, base: BaseLayout) -> KeepOut:
     motion = spec.prototype.motion
     approach = float(np.radians(motion.approach_deg))
-    if motion.controller == "grblhal":
+    if motion.homes:
         lowest = np.radians(home_angles(layout, motion).switch - OVERTRAVEL_DEG)
         approach = max(approach, float(layout.stops.angle[0] - lowest))
     return keep_out_volume(layout, base, spec.optics.capture_diameter_mm / 2, approach)

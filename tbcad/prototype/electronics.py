@@ -65,7 +65,7 @@ RELEASE: Row = ON_CABLE | {
     "path": "relay, camera's release",
 }
 HOME: Row = ON_CABLE | {
-    **{"signal": "home", "part": "SWITCH-SS-5GL2"},
+    **{"signal": "home", "part": "SWITCH-ROLLER"},
     "path": "common and normally closed contact of the switch, input and ground",
 }
 MOTOR: Row = {

@@ -47,7 +47,7 @@ MIN_PLATE_MM = BRACKET_HIGH_MM + 2.0  # out, of the plate's end
 # Of the switch's roller from the line of its holes: when free, and when the switch trips.
 FREE_MM, TRIP_MM = 19.3, 14.5
 TAB_BEYOND_MM = 0.7  # of the tab beyond where the switch trips
-SWITCH = "SWITCH-SS-5GL2"
+SWITCH = "SWITCH-ROLLER"
 # Of the switch, from the line of its holes: toward the axis to its body's end, outward to the
 # other, half its length; to the roller when fully pressed.
 BODY_IN_MM, BODY_OUT_MM, BODY_HALF_MM = 7.3, 2.9, 9.9
@@ -291,7 +291,8 @@ def homing_step(machine: AssembledMachine) -> Words:
 @planned("Angle zero")
 def zero_step(machine: AssembledMachine) -> Words:
     """Settings, homing and the trim."""
-    homes = machine.record.controller.firmware == "grblhal"
+    firmware = machine.record.controller.firmware
+    homes, klipper = firmware != "grbl", firmware == "klipper"
     rated = next((row.current_ma for row in machine.wiring if row.signal == "motor"), None)
     return told_words(
         __name__,
@@ -299,8 +300,11 @@ def zero_step(machine: AssembledMachine) -> Words:
         current=machine.record.drive.hold_current_a,
         of_motor=f", {rated / MA_PER_A:.1f} A," if rated else "",
         homes=homes,
+        grbl=not klipper,
+        klipper=klipper,
+        grblhal=firmware == "grblhal",
         by_hand=not homes,
-        unlock=when(homes, "Unlock the controller by $X. "),
+        unlock=when(firmware == "grblhal", "Unlock the controller by $X. "),
         falls=machine.record.power_off.fall_energy_j,
         off=machine.record.power_off,
         home=machine.record.home,

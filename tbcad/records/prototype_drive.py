@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tbcad.cad.formats.checked_files import Finite, Vector
+from tbcad.core.spec.prototype import Firmware
 from tbcad.records.document import RecordSection
 from tbcad.records.run import PhaseName
 
@@ -19,7 +20,7 @@ class Phase(RecordSection):
 class Controller(RecordSection):
     """The controller of motion and lights, and the photographs of a stop in order."""
 
-    firmware: Literal["grblhal", "grbl"]
+    firmware: Firmware
     axis: Literal["X", "A"]
     phases: tuple[Phase, ...] = Field(min_length=1)
 

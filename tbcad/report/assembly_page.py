@@ -3,14 +3,14 @@
 import base64
 import tempfile
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from importlib.resources import files
 from pathlib import Path
 
 from tbcad.common.atomic_files import replace_files, write_errors_as_input_errors
 from tbcad.output.single_files import check_file
-from tbcad.prototype.assembly_steps.machine import AssembledMachine
+from tbcad.prototype.assembly_steps.instructions import Instructions, hours_text
 from tbcad.prototype.assembly_steps.steps import Step
 from tbcad.report.drawing import check_drawn_files, draw_apart
 
@@ -22,8 +22,7 @@ WORDS = "assembly_page.toml"
 def write_page(
     folder: Path,
     out: Path,
-    machine: AssembledMachine,
-    steps: Sequence[Step],
+    told: Instructions,
     *,
     pictures: bool = True,
     force: bool = False,
@@ -34,30 +33,31 @@ def write_page(
     """
     check_file(out / NAME, force)
     drawn = _drawn(folder) if pictures else {}
-    text = page(machine, steps, drawn)
+    text = page(told, drawn)
     with write_errors_as_input_errors(out):
         out.mkdir(parents=True, exist_ok=True)
     return replace_files(out, {NAME: text.encode("utf-8")})[0]
 
 
-def page(machine: AssembledMachine, steps: Sequence[Step], pictures: Mapping[str, bytes]) -> str:
+def page(told: Instructions, pictures: Mapping[str, bytes]) -> str:
     """The page as HTML; pictures: PNG files by keys of steps."""
     words = tomllib.loads((files("tbcad.report") / WORDS).read_text(encoding="utf-8"))
-    what = {int(row["item"] or 0): str(row["what"]) for row in machine.bill.rows}
-    kinds = {machine.kind(part) for part in machine.bill.items}
-    tools = [tool for kind, tool in words["tools_of_kinds"].items() if kind in kinds]
+    about = (*told.about, words["pictures"])
     body = (
         "<h1>Assembly</h1>",
-        *(f"<p>{escape(text)}</p>" for text in words["about"]),
+        *(f"<p>{escape(text)}</p>" for text in about),
         "<h3>Tools</h3>",
-        _list([*words["tools"], *tools]),
+        _list(told.tools),
         "<nav><h3>Steps</h3><ol>",
-        *(f'<li><a href="#{step.key}">{escape(step.title)}</a></li>' for step in steps),
+        *(f'<li><a href="#{step.key}">{escape(step.title)}</a></li>' for step in told.steps),
         "</ol></nav>",
-        *(line for step in steps for line in _step(step, what, pictures)),
+        *_times(told),
+        "<h3>Tested</h3>",
+        _table(("What", "Tested"), told.tested),
+        *(line for step in told.steps for line in _step(step, told, pictures)),
         "<section><h2>Not drawn</h2><p>These parts of the list are no bodies of prototype.step, "
         "prototype.glb and the pictures.</p>",
-        _list(_not_drawn(machine, steps, words["without_body"])),
+        _list(told.not_drawn),
         "</section>",
     )
     style = f"<style>\n{words['style']}</style>"
@@ -67,24 +67,25 @@ def page(machine: AssembledMachine, steps: Sequence[Step], pictures: Mapping[str
     )
 
 
-def _not_drawn(
-    machine: AssembledMachine, steps: Sequence[Step], reasons: Mapping[str, str]
-) -> Iterator[str]:
-    """Parts without a body, by the reason, which there is for each kind."""
-    kinds: dict[str, list[str]] = {}
-    for use in (use for step in steps for use in step.parts if not use.bodies):
-        kinds.setdefault(reasons[machine.kind(use.part)], []).append(machine.ref(use.part))
-    yield from (f"{', '.join(dict.fromkeys(parts))}: {why}" for why, parts in kinds.items())
+def _times(told: Instructions) -> Iterator[str]:
+    yield f"<h3>Time</h3><p>{hours_text(sum(told.minutes.values()))} of work in all.</p>"
+    yield from (f"<p>{escape(text)}</p>" for text in told.times)
 
 
-def _step(step: Step, what: Mapping[int, str], pictures: Mapping[str, bytes]) -> Iterator[str]:
+def _table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    lines = [f"<tr>{''.join(f'<th>{escape(head)}</th>' for head in heads)}</tr>"]
+    lines += [f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows]
+    return "\n".join(["<table>", *lines, "</table>"])
+
+
+def _step(step: Step, told: Instructions, pictures: Mapping[str, bytes]) -> Iterator[str]:
     yield f'<section id="{step.key}"><h2>{step.number}. {escape(step.title)}</h2>'
+    tools = ", ".join(told.step_tools[step.key])
+    needed = escape(f" Tools: {tools}." if tools else "")
+    yield f"<p>About {hours_text(told.minutes[step.key])}.{needed}</p>"
     if step.parts:
-        yield "<table><tr><th>No.</th><th>Qty</th><th>Part</th><th>What it is</th></tr>"
-        for use in step.parts:
-            cells = (str(use.item), str(use.quantity), use.part, what[use.item])
-            yield f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
-        yield "</table>"
+        heads = ("No.", "Qty", "Part", "What it is")
+        yield _table(heads, told.uses(step))
     if step.key in pictures:
         data = base64.b64encode(pictures[step.key]).decode("ascii")
         yield f'<p><img alt="{escape(step.title)}" src="data:image/png;base64,{data}"></p>'

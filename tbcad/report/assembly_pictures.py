@@ -10,13 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pyvista
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 from scipy.ndimage import distance_transform_edt
 
+from tbcad.cad.drafting.callouts import RADIUS, Callout, Placed, place_callouts
+from tbcad.cad.drafting.callouts import SMALL as QUANTITY
 from tbcad.core.geometry.vectors import unit
+from tbcad.prototype.assembly_steps.exploded import offsets
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps
-from tbcad.report.exploded import Callout, draw_callouts, offsets, place_callouts
 from tbcad.report.page.bodies import prototype_bodies
 from tbcad.report.prototype_pictures import surface
 from tbcad.types import Bytes, Floats, Ints
@@ -31,6 +33,8 @@ AZIMUTHS, ELEVATIONS = range(-135, 181, 45), {20: 1.0, 50: 0.95, -25: 0.8, -55: 
 SQUARE_DEG, SQUARE_WORTH = 90, 0.9
 ANCHOR_PX = 12  # visible pixels that a call-out needs
 DIGIT, SHADES = 8, 32  # of colours that number bodies
+FONT, DOT, LINE, HALO = 26, 5, 3, 7
+INK, PAPER = "#111111", "#ffffff"
 
 
 class _Scene:
@@ -176,6 +180,29 @@ def _inside(mask: Sequence[bool] | Floats) -> tuple[float, float]:
     """The pixel (x, y) of a region that is farthest from its edge."""
     y, x = np.unravel_index(int(np.argmax(distance_transform_edt(mask))), np.shape(mask))
     return float(x), float(y)
+
+
+def draw_callouts(picture: Image.Image, placed: Sequence[Placed]) -> None:
+    """Draw lines, dots, circles and numbers."""
+    pen = ImageDraw.Draw(picture)
+    for colour, width, dot in ((PAPER, HALO, DOT + 2), (INK, LINE, DOT)):
+        for one in placed:
+            pen.line([one.middle, one.callout.anchor], fill=colour, width=width)
+            pen.circle(one.callout.anchor, dot, fill=colour)
+    for one in placed:
+        _number(pen, one, picture.width)
+
+
+def _number(pen: ImageDraw.ImageDraw, one: Placed, width: int) -> None:
+    x, y = one.middle
+    pen.circle((x, y), RADIUS, fill=PAPER, outline=INK, width=LINE)
+    pen.text((x, y), str(one.callout.number), INK, ImageFont.load_default(FONT), anchor="mm")
+    if one.callout.quantity > 1:
+        below = (x, y + RADIUS + 2)
+        font = ImageFont.load_default(QUANTITY)
+        pen.text(
+            below, f"x {one.callout.quantity}", INK, font, "mt", stroke_width=3, stroke_fill=PAPER
+        )
 
 
 if __name__ == "__main__":

@@ -226,7 +226,17 @@ def test_the_zero_pin_goes_through_head_and_disc(model: PrototypeModel) -> None:
 
 def test_both_controllers_are_told_the_same_machine(model: PrototypeModel) -> None:
     motion, angles = model.spec.prototype.motion, model.frame.of(HomingLayout).angles
-    files = controller_files(model.layout, model.drive, motion, len(model.stage.leds), "a design")
+    files = {
+        name: text
+        for controller in ("grblhal", "klipper")
+        for name, text in controller_files(
+            model.layout,
+            model.drive,
+            motion.model_copy(update={"controller": controller}),
+            len(model.stage.leds),
+            "a design",
+        ).items()
+    }
     grbl = {
         int(number): float(value)
         for number, value in re.findall(r"^\$(\d+)=(\S+)$", files["grbl_settings.txt"], re.M)

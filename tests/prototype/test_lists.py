@@ -81,7 +81,7 @@ def test_every_line_of_the_wiring(
         rating = float(str(row["resistor"]).removeprefix("R-").partition("W-")[0])
         assert rating >= 2 * (current / 1e3) ** 2 * ohm == pytest.approx(2 * row["dissipation_w"])
         assert row["pins"] == f"{2 * k + 1} {2 * k + 2}"
-        assert int(str(row["connector"]).removeprefix("XH-")) >= 2 * leds
+        assert int(str(row["connector"]).removeprefix("PLUG-")) >= 2 * leds
         assert 2 * leds * PARTS[row["wire"]]["outer_mm"] ** 2 <= 0.5 * (2 * stage.sizes.wire) ** 2
         assert float(row["length_mm"]) >= places[k, 0] + places[k, 2] - spec.frame.floor_mm + 500
     assert of["home"]["output"] == f"limit {axis}"

@@ -11,15 +11,16 @@ import pytest
 from PIL import Image
 
 from tbcad.app.cli import run
+from tbcad.cad.drafting.callouts import RADIUS as CALLOUT_RADIUS
+from tbcad.cad.drafting.callouts import Callout, cross, place_callouts
 from tbcad.core.mirrors.array import design
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics.windows import seam_gaps
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.prototype.assembly_steps.exploded import offsets
 from tbcad.prototype.assembly_steps.machine import read_machine
 from tbcad.report.close_ups import cells_aimed_at_origin, edge_of_field, seam_mirror
-from tbcad.report.exploded import RADIUS as CALLOUT_RADIUS
-from tbcad.report.exploded import Callout, cross, offsets, place_callouts
 from tbcad.report.shell_pictures import mirror_of_facets, read_modelled, section_of
 from tbcad.shell.facets import mirror_facets
 from tbcad.shell.files import camera_a_mesh

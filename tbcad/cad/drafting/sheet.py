@@ -143,7 +143,7 @@ def sheet_frame(paper: Point, scale: float | None, block: TitleBlock) -> Iterato
     start = paper[0] - BORDER_MM - TITLE_MM[0]
     left, low = start, BORDER_MM + TITLE_MM[1] - ROW_MM
     for width, label, value in rows:
-        yield from _cell((left, low, left + width, low + ROW_MM), label, value)
+        yield from cell((left, low, left + width, low + ROW_MM), label, value)
         if value is FIRST_ANGLE:
             yield from _first_angle((left + width - SYMBOL_MM, low + ROW_MM / 2))
         left += width
@@ -165,7 +165,8 @@ def _first_angle(middle: Point) -> Iterator[Entity]:
     yield Line(Layer.CENTRE, (right, y - thick - 1.0), (right, y + thick + 1.0))
 
 
-def _cell(box: Box, label: str, value: str) -> Iterator[Entity]:
+def cell(box: Box, label: str, value: str) -> Iterator[Entity]:
+    """A cell of a title block: what it is above what it says."""
     yield rectangle(box, Layer.FRAME)
     left, low, right, high = box
     room = right - left - 2 * INSIDE_MM

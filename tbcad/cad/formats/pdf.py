@@ -30,6 +30,7 @@ WIDTHS = {
     **{Layer.HIDDEN: 0.18, Layer.HATCH: FINE_MM, Layer.RAYS: FINE_MM},
 }
 DASHES = {Layer.FOLD: "[3 1.5]", Layer.HIDDEN: "[2 1]", Layer.CENTRE: "[8 2 1 2]"}  # mm
+FONT = "<</Type/Font/Subtype/Type1/BaseFont/Helvetica/Encoding/WinAnsiEncoding>>"
 EM = 1000.0  # units of the font's widths
 CAPITAL = 0.718  # height of capital letters in Helvetica, of its size
 QUARTER = math.pi / 2
@@ -58,20 +59,36 @@ def write_pdf(
     path: Path, title: str, size: tuple[float, float], entities: Iterable[Entity]
 ) -> None:
     """Write one page of a size (mm) with a title; entities are in mm from its lower left corner."""
-    scale = _number(POINTS_PER_MM)
-    drawn = "\n".join(["1 J 1 j", f"{scale} 0 0 {scale} 0 0 cm", *map(_styled, simple(entities))])
+    write_pages(path, title, size, [entities])
+
+
+def write_pages(
+    path: Path, title: str, size: tuple[float, float], pages: Sequence[Iterable[Entity]]
+) -> None:
+    """Write pages of a size (mm) with a title; entities as in `write_pdf`."""
     box = " ".join(_number(side * POINTS_PER_MM) for side in size)
-    font = "<</Type/Font/Subtype/Type1/BaseFont/Helvetica/Encoding/WinAnsiEncoding>>"
+    # The first page is object 3 and its contents are 5; each other page has the next two.
+    numbers = [3, *(2 * k + 4 for k in range(1, len(pages)))]
+    kids = " ".join(f"{number} 0 R" for number in numbers)
     objects = [
         "<</Type/Catalog/Pages 2 0 R>>",
-        "<</Type/Pages/Kids[3 0 R]/Count 1>>",
-        f"<</Type/Page/Parent 2 0 R/MediaBox[0 0 {box}]/Contents 5 0 R"
-        "/Resources<</Font<</F1 4 0 R>>>>>>",
-        font,
-        f"<</Length {len(_encoded(drawn))}>>\nstream\n{drawn}\nendstream",
-        f"<</Title({_escaped(title)})>>",
+        f"<</Type/Pages/Kids[{kids}]/Count {len(pages)}>>",
     ]
-    path.write_bytes(_file(objects))
+    for number, entities in zip(numbers, pages, strict=True):
+        contents = number + (2 if number == numbers[0] else 1)
+        objects.append(
+            f"<</Type/Page/Parent 2 0 R/MediaBox[0 0 {box}]/Contents {contents} 0 R"
+            "/Resources<</Font<</F1 4 0 R>>>>>>"
+        )
+        objects += [FONT] if number == numbers[0] else []
+        objects.append(_contents(entities))
+    path.write_bytes(_file([*objects, f"<</Title({_escaped(title)})>>"]))
+
+
+def _contents(entities: Iterable[Entity]) -> str:
+    scale = _number(POINTS_PER_MM)
+    drawn = "\n".join(["1 J 1 j", f"{scale} 0 0 {scale} 0 0 cm", *map(_styled, simple(entities))])
+    return f"<</Length {len(_encoded(drawn))}>>\nstream\n{drawn}\nendstream"
 
 
 def _file(objects: Sequence[str]) -> bytes:

@@ -17,6 +17,7 @@ Snap: TypeAlias = Literal["cover", "nearest"]
 Picture: TypeAlias = Literal["moved", "fixed"]
 Drive: TypeAlias = Literal["nema17-belt", "nema17-direct", "stage-60"]
 Hold: TypeAlias = Literal["magnet", "glue"]
+Firmware: TypeAlias = Literal["grblhal", "grbl", "klipper"]
 HOLDS: tuple[Hold, ...] = get_args(Hold)
 PAD_ANGLES_DEG = (50.0, 40.0, 30.0)  # tried in turn: flatter pads set a seat deeper, out of light
 # Tried in turn: a longer boss sets the frame farther back from what the base sweeps.
@@ -156,9 +157,10 @@ class MotionSpec(Section):
     axis: Literal["X", "A"] = "X"
     """Axis of the controller: X with a degree for a millimetre (GRBL 1.1 has X, Y and Z only),
     or A in degrees (grblHAL and others)."""
-    controller: Literal["grblhal", "grbl"] = "grblhal"
-    """Firmware of the controller: grblHAL switches lamp and LEDs on digital outputs (M64, M65);
-    GRBL 1.1 has none, so with it only the lit object is photographed."""
+    controller: Firmware = "grblhal"
+    """Firmware of the controller, whose program and settings alone are written: grblHAL and Klipper
+    switch lamp and LEDs on outputs; GRBL 1.1 has none, so with it only the lit object is
+    photographed."""
     trigger: Literal["coolant", "pause"] = "coolant"
     """What triggers a photograph: a relay on the coolant output (M8, M9), or a person (M0)."""
     home_deg: float = Field(0.0, ge=-180, le=180)
@@ -186,6 +188,11 @@ class MotionSpec(Section):
     safety: float = Field(2.0, ge=1, le=10)
     """Holding torque of the motor over the greatest torque of gravity and acceleration: for
     friction, and for what a stepper loses between full steps and at speed."""
+
+    @property
+    def homes(self) -> bool:
+        """Whether the controller finds angle zero by the switch."""
+        return self.controller != "grbl"
 
 
 class StageSpec(Section):

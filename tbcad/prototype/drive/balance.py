@@ -209,7 +209,7 @@ def home_angles(prototype: PrototypeLayout, motion: MotionSpec) -> HomeAngles:
     free = math.degrees(free_base_angles(prototype)[0])
     wanted = max(lowest - SWITCH_BELOW_DEG, free + OVERTRAVEL_DEG)
     switch = math.ceil(wanted / ANGLE_STEP_DEG) * ANGLE_STEP_DEG
-    if motion.controller == "grblhal" and switch > lowest - MIN_BELOW_DEG:
+    if motion.homes and switch > lowest - MIN_BELOW_DEG:
         raise SpecError(
             f"the base is free from {free:.1f} degrees on, which leaves no room for a switch below "
             f"its first angle {lowest:.1f}: make prototype.max_swing_deg larger, "

@@ -1,4 +1,4 @@
-"""Files of the controllers: program and settings of GRBL and grblHAL; what Klipper takes instead.
+"""Files of the chosen controller: program and settings of GRBL and grblHAL, or of Klipper.
 
 rotation_plan.nc: at each stop a photograph in the dark, one of each LED alone and one of the lit
 object. GRBL 1.1 refuses the word A, so its X takes degrees for millimetres; it drops comments in
@@ -28,6 +28,7 @@ import re
 from collections.abc import Iterable, Iterator
 from importlib.resources import files
 
+from tbcad.cad.formats.checked_files import Row
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.balance import (
@@ -52,7 +53,7 @@ OTHER_CYCLES = range(45, 50)  # of homing; boards have those of their axes, thre
 PULSE_US = 10  # of a step: optocouplers of drivers need 5 to 10
 # Places of the machine, and in grblHAL its other defaults (bits 0 to 8) and reports while it homes.
 GRBL_REPORTS, HAL_REPORTS = 0b1, 0b1_1111_1111 | 1 << 12
-PLAN, PROGRAM, CONFIG = "rotation_plan.nc", "rotation_plan_klipper.gcode", "klipper.cfg"
+PLAN, KLIPPER_PLAN, CONFIG = "rotation_plan.nc", "rotation_plan_klipper.gcode", "klipper.cfg"
 STEPPER = "MANUAL_STEPPER STEPPER=base"
 SEARCH = 1.5  # travel of the search for the switch, over the travel, as GRBL has it
 MINUTE_S, MILLISECONDS = 60, 1000
@@ -60,6 +61,7 @@ MESSAGE = re.compile(r"M0 \(MSG, (.*?)[,.?]? [Tt]hen resume\)")
 # Not the stepper's enable_pin, which a shutdown takes back. The switch is normally closed to
 # ground: high when pressed. After a day Klipper tells that it is idle, and does no more.
 _TEMPLATE = files("tbcad.prototype") / "files" / "klipper.cfg"
+KLIPPER_PINS = {"home": "endstop_pin", "motor": "step_pin and dir_pin"}
 TRAVEL_STEP_DEG = 0.001  # that the travel is rounded up to
 Setting = tuple[int, float, str]
 
@@ -67,15 +69,29 @@ Setting = tuple[int, float, str]
 def controller_files(
     layout: PrototypeLayout, drive: Drive, motion: MotionSpec, leds: int, design: str
 ) -> dict[str, str]:
-    """Texts of program, settings and, with grblHAL, what Klipper takes instead, by name."""
+    """Texts of the chosen controller's program and settings, by name."""
     program, angles = gcode_program(layout, drive, motion, leds), home_angles(layout, motion)
-    values = settings(drive, motion, angles)
-    title = f"settings of {design} for {motion.controller}"
-    texts: dict[str, Iterable[str]] = {PLAN: program, NAME: settings_lines(title, values)}
-    if motion.controller == "grblhal":
-        texts[PROGRAM] = klipper_program(program, motion, angles)
-        texts[CONFIG] = klipper_config(drive, motion, lights(leds, motion))
+    texts: dict[str, Iterable[str]] = {
+        KLIPPER_PLAN: klipper_program(program, motion, angles),
+        CONFIG: klipper_config(drive, motion, lights(leds, motion)),
+    }
+    if motion.controller != "klipper":
+        title = f"settings of {design} for {motion.controller}"
+        values = settings(drive, motion, angles)
+        texts = {PLAN: program, NAME: settings_lines(title, values)}
     return {name: "\n".join(lines) + "\n" for name, lines in texts.items()}
+
+
+def wired(row: Row, motion: MotionSpec) -> Row:
+    """A line of the wiring, for Klipper with the names and commands of klipper.cfg."""
+    if motion.controller != "klipper":
+        return row
+    signal = str(row["signal"])
+    if row["on"]:
+        switch, pin = f"SET_PIN PIN={signal} VALUE=", f"[output_pin {signal}]"
+        output = re.sub(r"coolant|(?<=digital )\d+", pin, str(row["output"]))
+        return {**row, "output": output, "on": f"{switch}1", "off": f"{switch}0"}
+    return {**row, "output": KLIPPER_PINS.get(signal, row["output"])}
 
 
 def settings(drive: Drive, motion: MotionSpec, angles: HomeAngles) -> list[Setting]:
@@ -215,7 +231,7 @@ def gcode_program(
 def _known_angle(prototype: PrototypeLayout, motion: MotionSpec) -> Iterator[str]:
     """The base to a known angle: by homing, or by a person."""
     modes = "G21 G90 G94 G54 (a degree for a millimetre, absolute, units a minute)"
-    if motion.controller == "grbl":
+    if not motion.homes:
         yield f"M0 (MSG, base at {motion.home_deg:g} degrees, object straight? Then resume)"
         yield modes
         yield f"G92 {_axis_word(motion.home_deg, motion)}"

@@ -165,7 +165,7 @@ def _swing(built: PrototypeModel, motion: MotionSpec) -> tuple[float, float]:
     """Base angles that the program drives between: from the switch, or from the start."""
     todo = stop_sequence(built.layout, motion)
     angles = [todo.start, motion.home_deg, *todo.angle.tolist()]
-    if motion.controller == "grblhal":
+    if motion.homes:
         angles.append(built.frame.of(HomingLayout).angles.switch)
     return min(angles), max(angles)
 

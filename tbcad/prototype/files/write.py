@@ -27,6 +27,7 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
 from tbcad.prototype.arrangement import PrototypeModel, arrangements
+from tbcad.prototype.assembly_steps.book import write_book
 from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.prototype.assembly_steps.steps import mounting_record
 from tbcad.prototype.base.caps import cap_limits, cap_sheet
@@ -57,6 +58,7 @@ COLOURS: dict[Role, Colour] = {
     "cap": (0.85, 0.70, 0.40, 1.0),
     "stage": (0.30, 0.30, 0.32, 1.0),
     "frame": (0.85, 0.50, 0.30, 1.0),
+    "tool": (0.85, 0.50, 0.30, 1.0),
 }
 
 
@@ -103,6 +105,8 @@ def export_prototype(
     sizes = {ball: "" for ball, cap in caps if not cap}
     steps = mounting_record(AssembledMachine(listed, record, (), sizes, built.parts))
     record.model_copy(update={"assembly_steps": steps}).write(folder / NAME)
+    tools = coloured_meshes([_printed("tools", built, ("tool",))])  # on the bed, of no assembly
+    submit(write_book, folder, [*meshes, *tools], title)
     radius = spec.optics.capture_diameter_mm / 2
     write_camera_sheet(folder, design.arrays[0], radius, built.rig_light)
     return spec
@@ -131,13 +135,14 @@ def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: P
 
 def _write_tables(built: PrototypeModel, folder: Path) -> None:
     layout, motion = built.layout, built.spec.prototype.motion
+    wires = [controllers.wired(row, motion) for row in built.frame.of(Wiring).rows]
     loads = drive_loads(built.drive, base_torques(built.balance, layout.stops.range, motion))
     for name, columns, rows in (
         (BALLS_FILE, tables.BALL_COLUMNS, tables.ball_rows(layout)),
         ("rotation_plan.csv", tables.PICTURE_COLUMNS, tables.picture_rows(layout)),
         ("stops.csv", tables.STOP_COLUMNS, tables.stop_rows(layout, built.balance, loads)),
         ("plate_holes.csv", tables.HOLE_COLUMNS, tables.hole_rows(built.frame.of(Stock))),
-        (WiringRow.FILE, WiringRow.columns(), built.frame.of(Wiring).rows),
+        (WiringRow.FILE, WiringRow.columns(), wires),
     ):
         write_table(folder / name, columns, rows)
     texts = controllers.controller_files(

@@ -15,7 +15,7 @@ HOMING_SEARCH = 1.5  # times the travel: as far as GRBL searches for the switch
 PLACE_DEG = 0.05  # a controller reports steps of 0.02 degrees
 PLACE_TRIES = 5  # a report may be from just before the end of a motion
 SAME = 1e-4  # of settings, relative to their values
-FIRMWARES = {"grblhal": "grblHAL", "grbl": "GRBL 1.1"}
+FIRMWARES = {"grblhal": "grblHAL", "grbl": "GRBL 1.1", "klipper": "Klipper"}
 UNLOCK = "$X"
 SHOWN = 4
 

@@ -17,13 +17,12 @@ from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.errors import InputError
 from tbcad.rig.control.base import Base, travel_s
 from tbcad.rig.control.klipper import HOLD_FIRST, MOTOR, READY, Klipper
-from tbcad.rig.control.plan import ControllerReset, ControlPlan, MachineFault, Move
+from tbcad.rig.control.plan import STEPPER, ControllerReset, ControlPlan, MachineFault, Move
 from tbcad.types import Progress
 
 PROGRAM, CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"
 FILL_IN = "FILL_IN"
-OTHER = "build for grblHAL, prototype.motion.controller, whose program Klipper's is written from"
-STEPPER = "MANUAL_STEPPER STEPPER=base"
+OTHER = "build again with --set prototype.motion.controller=klipper"
 _NUMBER = r"-?\d+(?:\.\d+)?"
 _SEARCH = re.compile(rf"{STEPPER} MOVE=(-{_NUMBER}) SPEED=({_NUMBER}) STOP_ON_ENDSTOP=(1|home)$")
 _SWITCH = re.compile(rf"{STEPPER} SET_POSITION=({_NUMBER})$")

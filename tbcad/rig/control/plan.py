@@ -1,7 +1,7 @@
 """What an export says of a run: stops, lights, times, settings, and the motions of its program.
 
-Pauses of rotation_plan.nc become questions to the operator, and what it does for each photograph is
-done by the run: a light, the camera, the light off again.
+Pauses of the controller's program become questions to the operator, and what it does for each
+photograph is done by the run: a light, the camera, the light off again.
 """
 
 import re
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from tbcad.cad.formats.checked_files import REBUILD
-from tbcad.core.spec.prototype import MotionSpec
+from tbcad.core.spec.prototype import Firmware, MotionSpec
 from tbcad.errors import InputError, one_line
 from tbcad.records.design import NAME as DESIGN_FILE
 from tbcad.records.design import DesignRecord
@@ -21,25 +21,42 @@ from tbcad.records.run import Frame
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow, StopRow
 from tbcad.rig.runs import export_digests
 
-PROGRAM = "rotation_plan.nc"
-_MOVE = re.compile(r"G1 ([XA])(-?\d+\.\d+)(?: F\d+(?:\.\d+)?)?$")
-_STOP = re.compile(r"\(stop (\d+) of (\d+): ")
-_PAUSE = re.compile(r"M0 \(MSG, (.*)\)$")
-_SET = re.compile(r"G92 [XA](-?\d+\.\d+)$")
-_TURN = "turn the object"
-_HOME = "$H"
-SETTINGS = "grbl_settings.txt"
-FILES = (
-    DESIGN_FILE,
-    MirrorRow.FILE,
-    RECORD,
-    BallRow.FILE,
-    PictureRow.FILE,
-    StopRow.FILE,
-    PROGRAM,
-    SETTINGS,
+SETTINGS, STEPPER = "grbl_settings.txt", "MANUAL_STEPPER STEPPER=base"
+KLIPPER = "klipper"
+
+
+@dataclass(frozen=True)
+class _Words:
+    """How the program of a firmware is called, and what it has for what a run takes from it."""
+
+    file: str
+    move: re.Pattern[str]  # to an angle, in degrees
+    stop: re.Pattern[str]  # its number, and that of the last
+    pause: re.Pattern[str]  # what it asks for
+    known: re.Pattern[str]  # the angle that the base is at when it is homed
+    home: re.Pattern[str]  # the search for the switch
+
+
+_GRBL = _Words(
+    "rotation_plan.nc",
+    re.compile(r"G1 [XA](-?\d+\.\d+)(?: F\d+(?:\.\d+)?)?$"),
+    re.compile(r"\(stop (\d+) of (\d+): "),
+    re.compile(r"M0 \(MSG, (.*)\)$"),
+    re.compile(r"G92 [XA](-?\d+\.\d+)$"),
+    re.compile(r"\$H$"),
 )
-"""What a run depends on."""
+_MOVE = re.compile(rf"{STEPPER} MOVE=(-?\d+(?:\.\d+)?) SPEED=\d+(?:\.\d+)?$")
+_KLIPPER = _Words(
+    "rotation_plan_klipper.gcode",
+    _MOVE,
+    re.compile(r"; stop (\d+) of (\d+): "),
+    re.compile(r'RESPOND MSG="(.*)"$'),
+    _MOVE,  # off the switch
+    re.compile(rf"{STEPPER} MOVE=.* STOP_ON_ENDSTOP="),
+)
+_TURN = "turn the object"
+FILES = (DESIGN_FILE, MirrorRow.FILE, RECORD, BallRow.FILE, PictureRow.FILE, StopRow.FILE)
+"""What a run depends on, besides the program, and settings that can be sent."""
 TURNS: tuple[Literal[0, 180], ...] = (0, 180)
 ANGLE_DEG = 1e-3  # a program's angles are truncated to 1e-4
 DIRECTION = 3  # the setting that is changed where the base turns against its arrow
@@ -60,7 +77,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Program:
-    """The motions of rotation_plan.nc."""
+    """The motions of the controller's program."""
 
     ready: str  # what a person must have done before the start
     known_angle: tuple[str, ...]  # lines that bring the base to a known angle and set it
@@ -72,51 +89,56 @@ class Program:
     end: Move  # where the base is left
 
 
-def read_program(folder: Path) -> Program:
-    """The program of an export that tbcad build wrote."""
-    path = folder / PROGRAM
+def read_program(folder: Path, firmware: Firmware) -> Program:
+    """The program of an export that tbcad build wrote for a firmware."""
+    words = _words(firmware)
+    path = folder / words.file
     if not path.is_file():
         raise InputError(f"{path} is not there: build the prototype too, tbcad build")
     try:
-        return _program(path.read_text(encoding="ascii").splitlines())
+        return _program(path.read_text(encoding="ascii").splitlines(), words)
     except (ValueError, IndexError, StopIteration, OSError) as error:
         raise InputError(f"{path} is no program of tbcad: {error}: {REBUILD}") from None
 
 
-def _program(lines: list[str]) -> Program:
-    first = next(i for i, line in enumerate(lines) if _STOP.match(line))
-    turn = next(i for i, line in enumerate(lines) if _TURN in line and _PAUSE.match(line))
+def _words(firmware: Firmware) -> _Words:
+    return _KLIPPER if firmware == KLIPPER else _GRBL
+
+
+def _program(lines: list[str], words: _Words) -> Program:
+    first = next(i for i, line in enumerate(lines) if words.stop.match(line))
+    turn = next(i for i, line in enumerate(lines) if _TURN in line and words.pause.match(line))
     before = [line for line in lines[:first] if not line.startswith("(")]
     angle = [line for line in before[1:-1] if not line.startswith("M65")]
-    known = [float(match[1]) for line in angle if (match := _SET.match(line))]
+    known = [float(match[1]) for line in angle if (match := words.known.match(line))]
     if not known:
         raise ValueError("it sets no angle")
     pause = "pause with a message"
     return Program(
-        ready=_matched(_PAUSE, before[0], pause)[1],
+        ready=_matched(words.pause, before[0], pause)[1],
         known_angle=tuple(angle),
         known_deg=known[0],
-        homes=_HOME in angle,
-        start=_move(before[-1]),
-        stops=_stops(lines[:turn]),
-        turn=_matched(_PAUSE, lines[turn], pause)[1],
-        end=_move([line for line in lines[turn:] if line.startswith("G1 ")][-1]),
+        homes=any(map(words.home.match, angle)),
+        start=_move(before[-1], words),
+        stops=_stops(lines[:turn], words),
+        turn=_matched(words.pause, lines[turn], pause)[1],
+        end=_move([line for line in lines[turn:] if words.move.match(line)][-1], words),
     )
 
 
-def _stops(lines: list[str]) -> dict[int, Move]:
+def _stops(lines: list[str], words: _Words) -> dict[int, Move]:
     found = [
-        (int(match[1]), int(match[2]), _move(lines[i + 1]))
+        (int(match[1]), int(match[2]), _move(lines[i + 1], words))
         for i, line in enumerate(lines)
-        if (match := _STOP.match(line))
+        if (match := words.stop.match(line))
     ]
     if [number for number, _, _ in found] != list(range(1, found[0][1] + 1)):
         raise ValueError("its stops are not numbered from 1 to the last")
     return {number: move for number, _, move in found}
 
 
-def _move(line: str) -> Move:
-    return Move(line, float(_matched(_MOVE, line, "motion of the base")[2]))
+def _move(line: str, words: _Words) -> Move:
+    return Move(line, float(_matched(words.move, line, "motion of the base")[1]))
 
 
 def _matched(form: re.Pattern[str], line: str, what: str) -> re.Match[str]:
@@ -131,11 +153,11 @@ class ControlPlan:
 
     sha256: dict[str, str]  # of each file that it depends on, by name
     size_px: tuple[int, int]  # columns and rows of the design's camera
-    firmware: Literal["grblhal", "grbl"]  # of the controller, "grblhal" or "grbl"
+    firmware: Firmware  # of the controller
     axis: str
     phases: tuple[Phase, ...]  # of a stop, in order
     motion: MotionSpec
-    settings: dict[int, float]  # of the controller, by number
+    settings: dict[int, float]  # of the controller, by number; Klipper has none
     program: Program
     frames: tuple[Frame, ...]  # of both runs, in order
 
@@ -149,16 +171,17 @@ def read_control_plan(folder: Path) -> ControlPlan:
     """Read a build with a prototype; InputError: what is missing or does not fit."""
     design = DesignRecord.read(folder / DESIGN_FILE)
     controller = Prototype.read(folder / RECORD).controller
-    program = read_program(folder)
+    firmware = controller.firmware
+    program, settings = read_program(folder, firmware), () if firmware == KLIPPER else (SETTINGS,)
     angles = _angles(folder, program)
     return ControlPlan(
-        sha256=export_digests(folder, FILES),
+        sha256=export_digests(folder, (*FILES, _words(firmware).file, *settings)),
         size_px=(design.cameras[0].width_px, design.cameras[0].height_px),
-        firmware=controller.firmware,
+        firmware=firmware,
         axis=controller.axis,
         phases=controller.phases,
         motion=design.spec.prototype.motion,
-        settings=read_settings(folder / SETTINGS),
+        settings={k: v for name in settings for k, v in read_settings(folder / name).items()},
         program=program,
         frames=tuple(
             Frame(object_turn_deg=turn, stop=stop, base_angle_deg=angle)
@@ -193,9 +216,9 @@ def _angles(folder: Path, program: Program) -> dict[int, float]:
     for stop, angle in angles.items():
         move = program.stops.get(stop)
         if move is None or abs(move.angle_deg - angle) > ANGLE_DEG:
-            raise InputError(f"{path}: {PROGRAM} does not drive to stop {stop}: {REBUILD}")
+            raise InputError(f"{path}: the program does not drive to stop {stop}: {REBUILD}")
     if len(angles) != len(program.stops):
-        raise InputError(f"{path} has another number of stops than {PROGRAM}: {REBUILD}")
+        raise InputError(f"{path} has another number of stops than the program: {REBUILD}")
     return angles
 
 

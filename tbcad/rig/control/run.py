@@ -9,13 +9,14 @@ from pathlib import Path
 from time import monotonic
 
 from tbcad.common.screen import stages
+from tbcad.core.spec.prototype import Firmware
 from tbcad.errors import InputError
 from tbcad.options.machines import Ask, Preflight, RunOptions, Show
 from tbcad.options.shared import exposures
 from tbcad.output.manifest import refuse_inside
 from tbcad.output.single_files import refuse_inputs
 from tbcad.records.run import DARK_LIT, Frame, PhaseTimes, exposure_name, read_record
-from tbcad.rig.control.base import Base
+from tbcad.rig.control.base import FIRMWARES, Base
 from tbcad.rig.control.cameras import (
     check_camera_name,
     check_can_expose,
@@ -35,7 +36,13 @@ from tbcad.rig.control.photographs import (
     run_record,
     taken_twice,
 )
-from tbcad.rig.control.plan import CameraFault, ControlPlan, MachineFault, read_control_plan
+from tbcad.rig.control.plan import (
+    KLIPPER,
+    CameraFault,
+    ControlPlan,
+    MachineFault,
+    read_control_plan,
+)
 from tbcad.rig.control.selection import (
     BYTES_PER_PX,
     CAPTURE_S,
@@ -363,7 +370,10 @@ def machine_at(
     port: str, folder: Path, plan: ControlPlan, note: Progress, stack: ExitStack
 ) -> DrivenMachine:
     """Open a port, which the stack closes: of a serial line, or "moonraker:" and a URL."""
-    if port.startswith(PREFIX):
+    to_klipper = port.startswith(PREFIX)
+    if to_klipper != (plan.firmware == KLIPPER) and (to_klipper or "://" not in port):
+        raise InputError(_other_firmware(port, plan.firmware))
+    if to_klipper:
         server = Moonraker(read_address(port.removeprefix(PREFIX)))
         return KlipperBase(Klipper(server, note), plan, read_klipper_files(folder))
     if "://" in port:
@@ -371,3 +381,13 @@ def machine_at(
     line = SerialPort(port)
     stack.callback(line.close)
     return Base(Grbl(line, note), plan)
+
+
+def _other_firmware(port: str, firmware: Firmware) -> str:
+    klipper = firmware == KLIPPER
+    wanted = f"{PREFIX}http://HOST" if klipper else "the controller's serial port"
+    other = "grblhal" if klipper else KLIPPER
+    return (
+        f"--port is {port:.60}, but the build is for {FIRMWARES[firmware]}: say {wanted}, or build "
+        f"again with --set prototype.motion.controller={other}"
+    )

@@ -9,7 +9,7 @@ from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.drive.balance import HomeAngles
 from tbcad.prototype.drive.drive import BaseTorques, choose_drive, load_drives
 from tbcad.prototype.electronics import lights
-from tbcad.prototype.files.controllers import klipper_config, klipper_program, settings
+from tbcad.prototype.files.controllers import klipper_config, klipper_program, settings, wired
 from tbcad.prototype.purchased.parts import load_parts
 
 MOTION = MotionSpec(home_trim_deg=0.5)
@@ -65,6 +65,20 @@ def test_every_command_has_its_translation() -> None:
         *(f"{pin}lamp VALUE=1", f"{pin}led_3 VALUE=1"),
         *(f"{pin}release VALUE=1", f"{pin}release VALUE=0", f"{pin}led_3 VALUE=0"),
     ]
+
+
+def test_wiring_has_the_names_of_the_configuration() -> None:
+    light = {"signal": "led_2", "output": "digital 2", "on": "M64 P2", "off": "M65 P2"}
+    klipper = MOTION.model_copy(update={"controller": "klipper"})
+    assert wired(light, MOTION) == light
+    found = wired(light, klipper)
+    assert found["output"] == "digital [output_pin led_2]"
+    assert (found["on"], found["off"]) == tuple(f"SET_PIN PIN=led_2 VALUE={on}" for on in "10")
+    release = {"signal": "release", "output": "coolant", "on": "M8", "off": "M9"}
+    assert wired(release, klipper)["output"] == "[output_pin release]"
+    assert wired({"signal": "home", "output": "limit X", "on": None}, klipper)["output"] == (
+        "endstop_pin"
+    )
 
 
 def test_configuration() -> None:

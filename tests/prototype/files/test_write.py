@@ -52,13 +52,12 @@ def test_all_files_are_there(folder: Path, record: dict[str, Any]) -> None:
         "rotation_plan.nc",
         "bom.csv",
     }
-    tables |= {"plate_holes.csv", "wiring.csv", "grbl_settings.txt", "klipper.cfg"}
-    tables |= {"rotation_plan_klipper.gcode"}
+    tables |= {"plate_holes.csv", "wiring.csv", "grbl_settings.txt"}
     sheets = [*record["drawings"], *record["caps"]]
     drawn = {one[kind] for one in sheets for kind in ("pdf", "dxf")}
     assert drawn >= {f"drawing_{part}.pdf" for part in ("plate", "wheel", "upright")}
     shroud = {path.name for path in folder.glob("shroud_*.dxf")}
-    whole = {"prototype.json", "prototype.step", "prototype.glb"}
+    whole = {"prototype.json", "prototype.step", "prototype.glb", "assembly.pdf"}
     records = {"design.json", "mirrors.csv", "manifest.json", "camera.json"}
     assert {p.name for p in folder.iterdir()} == own | tables | drawn | shroud | whole | records
     assert json.loads((folder / "design.json").read_text())["parts"] == []

@@ -81,6 +81,11 @@ def plain_export(exported: Callable[[MotionSpec], Path]) -> Path:
 
 
 @pytest.fixture(scope="session")
+def klipper_export(exported: Callable[[MotionSpec], Path]) -> Path:
+    return exported(MotionSpec(controller="klipper"))
+
+
+@pytest.fixture(scope="session")
 def switch_deg(layout: PrototypeLayout) -> float:
     return home_angles(layout, MotionSpec()).switch
 
@@ -102,8 +107,8 @@ def plain_rig(plain_export: Path, tmp_path: Path, switch_deg: float) -> Iterator
 
 
 @pytest.fixture
-def klipper_rig(control_export: Path, tmp_path: Path, switch_deg: float) -> Iterator[Rig]:
-    yield from closed(klipper_rig_of(control_export, tmp_path, switch_deg))
+def klipper_rig(klipper_export: Path, tmp_path: Path, switch_deg: float) -> Iterator[Rig]:
+    yield from closed(klipper_rig_of(klipper_export, tmp_path, switch_deg))
 
 
 @pytest.fixture(params=["rig", "klipper_rig"])

@@ -206,15 +206,33 @@ def test_same_values(wanted: str, found: object, same: bool) -> None:
 
 
 def test_exports_that_are_not_for_klipper(
-    control_export: Path, plain_export: Path, tmp_path: Path, klipper_rig: Rig, refused: Told
+    klipper_export: Path,
+    plain_export: Path,
+    control_export: Path,
+    tmp_path: Path,
+    klipper_rig: Rig,
+    refused: Told,
 ) -> None:
-    klipper_rig.export = plain_export
-    line = refused(klipper_rig.words())
-    assert "rotation_plan_klipper.gcode is not there: build for grblHAL" in line
-    klipper_rig.export = Path(shutil.copytree(control_export, tmp_path / "copy"))
+    for other, name in ((plain_export, "GRBL 1.1"), (control_export, "grblHAL")):
+        klipper_rig.export = other
+        line = refused(klipper_rig.words())
+        assert f"but the build is for {name}: say the controller's serial port" in line
+        assert "--set prototype.motion.controller=klipper" in line
+    klipper_rig.export = Path(shutil.copytree(klipper_export, tmp_path / "copy"))
     program = klipper_rig.export / "rotation_plan_klipper.gcode"
     program.write_text(program.read_text().replace("STOP_ON_ENDSTOP=1", "STOP_ON_ENDSTOP=-1"))
     assert "does not home once" in refused(klipper_rig.words())
-    program.write_text((control_export / program.name).read_text())
+    program.write_text((klipper_export / program.name).read_text())
     (klipper_rig.export / "klipper.cfg").write_text("velocity: 3\n")
     assert "is no configuration" in refused(klipper_rig.words())
+    (klipper_rig.export / "klipper.cfg").unlink()
+    assert "klipper.cfg is not there: build again" in refused(klipper_rig.words())
+    program.unlink()
+    assert f"{program.name} is not there" in refused(klipper_rig.words())
+
+
+def test_a_serial_port_is_not_klippers(klipper_rig: Rig, refused: Told) -> None:
+    words = klipper_rig.words()
+    words[words.index("--port") + 1] = "/dev/ttyUSB0"
+    line = refused(words)
+    assert "the build is for Klipper: say moonraker:http://HOST, or build again with" in line

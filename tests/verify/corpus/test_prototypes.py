@@ -33,13 +33,13 @@ def test_edited_paper_is_told_and_refused_only_strictly(
 ) -> None:
     folder = copy(good_prototype, tmp_path / "export")
     paper = [name for name in load(folder, "manifest.json")["files"] if is_paper(name)]
-    assert {"bom.csv", "wiring.csv", "camera.json", "drawing_plate.pdf"} <= {*paper}
+    assert {"assembly.pdf", "bom.csv", "wiring.csv", "camera.json", "drawing_plate.pdf"} <= {*paper}
     for name in paper:
         change(folder, name, edited_pdf if name.endswith(".pdf") else tied_list)
     assert main([str(folder), "-q"]) == 0
     verdict, line = capsys.readouterr().out.splitlines()
     assert verdict.startswith("PASS")
-    assert line.startswith("changed since the build: bom.csv, camera.json, drawing_")
+    assert line.startswith("changed since the build: assembly.pdf, bom.csv, camera.json, ")
     assert main([str(folder), "-q", "--strict"]) == 1
     assert capsys.readouterr().out == "FAIL: failed: paper\n"
     change(folder, "plate_holes.csv", lambda data: data + b"\n")

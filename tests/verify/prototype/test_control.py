@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tbcad_verify.errors import BadExport
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control import homing_checks, program_checks
 from tbcad_verify.prototype.control.gcode_machine import run_program
@@ -57,6 +58,15 @@ def context(synthetic_prototype: Path) -> PrototypeContext:
     return PrototypeContext(export, record.model_copy(update=texts))
 
 
+def for_klipper(context: PrototypeContext) -> PrototypeContext:
+    """The same design with Klipper."""
+    spec = context.export.spec
+    motion = spec.prototype.motion.model_copy(update={"controller": "klipper"})
+    prototype = spec.prototype.model_copy(update={"motion": motion})
+    export = replace(context.export, spec=spec.model_copy(update={"prototype": prototype}))
+    return replace(context, export=export)
+
+
 FAULTS: dict[str, Callable[[PrototypeContext], Iterable[str]]] = {
     "program": program_checks.program_faults,
     "settings": lambda context: homing_checks.settings_faults(context, DRIVE.ratio),
@@ -100,6 +110,30 @@ def test_another_axis_is_the_designs(context: PrototypeContext) -> None:
     text = context.prototype.program.replace(" X", " A")
     assert faults(replace(context, export=export), "program", text) == ""
     assert "drives axis A" in faults(context, "program", text)
+
+
+def test_the_program_of_the_chosen_controller_is_run(context: PrototypeContext) -> None:
+    chosen = for_klipper(context)
+    assert [*program_checks.program_faults(chosen)] == []
+    assert [*homing_checks.settings_faults(chosen, DRIVE.ratio)] == []
+    assert faults(chosen, "program", "G1 X5\n") == ""  # is of another controller
+    text = chosen.prototype.klipper.replace("PAUSE\n", "", 1)
+    changed = chosen.prototype.model_copy(update={"klipper": text})
+    assert [*program_checks.program_faults(replace(chosen, prototype=changed))]
+
+
+@pytest.mark.parametrize("name", ["klipper.cfg", "rotation_plan_klipper.gcode"])
+def test_files_of_another_controller_are_refused(prototype_folder: Path, name: str) -> None:
+    (prototype_folder / name).write_text("PAUSE\n")
+    with pytest.raises(BadExport, match=f"{name} is not for grblhal"):
+        read_export(prototype_folder)
+
+
+@pytest.mark.parametrize("name", ["grbl_settings.txt", "rotation_plan.nc"])
+def test_files_of_the_controller_are_needed(prototype_folder: Path, name: str) -> None:
+    (prototype_folder / name).unlink()
+    with pytest.raises(BadExport, match=name):
+        read_export(prototype_folder)
 
 
 FOREIGN = (
@@ -172,6 +206,7 @@ KLIPPER_FAULTS = (
     (r"SET_PIN PIN=lamp VALUE=0\n(?=; stop)", "", "moves while a light is on"),
     (r'RESPOND MSG="turn.*\nPAUSE\n', "", "pauses for pin, not for pin, turn"),
     (r"G4 P500\n", "G4 P50\n", "s after the motion"),
+    (r"(; stop 1 .*\n.*MOVE=)\S+", r"\g<1>5", "photograph 1 at 5.0000 deg"),
     (r"\Z", "SET_PIN PIN=lamp VALUE=1\n", "ends while a light is on"),
 )
 
@@ -226,6 +261,10 @@ def test_no_line_of_the_configuration_may_go_come_twice_or_be_another(
         ("step_pin: FILL_IN\ndir_pin: FILL_IN", "step_pin: PA1\ndir_pin: PA1", True),
         ("step_pin: FILL_IN\ndir_pin: FILL_IN", "step_pin: PA1\ndir_pin: PA2", False),
         ("dir_pin: ", "dir_pin: !", True),
+        ("endstop_pin: ^", "endstop_pin: ", True),
+        ("pins: ", "pins: !", True),
+        ("timeout: 86400", "timeout: 60", True),
+        ("[printer]", "[gcode_macro PAUSE]\ngcode:\n[printer]", True),
         ('stays on"', 'stays on {% M84 %}"', True),
         ("step_pin: ", "enable_pin: PA1\nstep_pin: ", True),
         ("[respond]", "#*# [idle_timeout]\n[respond]", True),

@@ -245,7 +245,7 @@ def test_no_field_of_the_record_may_be_of_another_kind(prototype_folder: Path) -
     for place in leaves(json.loads(whole)):
         record("/".join(map(str, place)), {"no": "value"})(prototype_folder)
         with pytest.raises(BadExport, match=str(place[0])):
-            read_prototype(prototype_folder, {"a", "b"})
+            read_prototype(prototype_folder, {"a", "b"}, "grblhal")
         path.write_text(whole)
 
 

@@ -21,6 +21,7 @@ FILE = "drawing_*.dxf, plate_holes.csv"
 CHECKS = {"drawings": "faults", "plate holes": "faults"}
 DRAWN = ("plate", "upright_left", "wheel", "lamp_1")  # bodies of the assembly, where there are such
 TAPPED_M5_MM = 4.2
+ASSEMBLY = "assembly.pdf"
 ROUND = ("cylinder", "sphere")
 CORNERS = 4  # of a strip
 SAME_MM = 1e-6
@@ -32,7 +33,7 @@ def checks(
     """All drawings, and the drill table of the plate."""
     drawings = [*_drawing_faults(context, solids), *_cap_faults(context, solids)]
     folder, record = context.export.folder, context.prototype
-    for name in [one.pdf for one in record.drawn]:
+    for name in [ASSEMBLY, *(one.pdf for one in record.drawn)]:
         if (folder / name).exists():
             drawings += sheet_faults(read(folder, name, MAX_TEXT_BYTES))
     faults = drawings, _table_faults(context, solids)

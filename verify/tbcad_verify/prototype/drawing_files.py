@@ -5,8 +5,8 @@ So there are the sections, layers, kinds of entities and group codes that tbcad 
 others. What is on the layers `cut` and `fold` is measured, all of it.
 
 What is written on a PDF is paper, what a viewer does with it is not: it may run scripts, open
-addresses, hold other files, or scale its page. So its objects are those that tbcad writes, and its
-page shows lines and texts at full size of the paper, whose frame is where ISO 5457 has it.
+addresses, hold other files, or scale its pages. So its objects are those that tbcad writes, and its
+pages show lines and texts at full size of the paper, whose frame is where ISO 5457 has it.
 Sources: Autodesk's DXF reference for R2010; ISO 32000-1, chapters 7 to 9.
 """
 
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -56,16 +57,14 @@ DRAWN = {
 
 NUMBER = r"-?\d+(?:\.\d+)?"
 TEXT = r"\((?:[^()\\\n]|\\[()\\])*\)"
-OBJECTS = (
-    "<</Type/Catalog/Pages 2 0 R>>",
-    "<</Type/Pages/Kids[3 0 R]/Count 1>>",
-    "<</Type/Page/Parent 2 0 R/MediaBox[0 0 @ @]/Contents 5 0 R/Resources<</Font<</F1 4 0 R>>>>>>",
-    "<</Type/Font/Subtype/Type1/BaseFont/Helvetica/Encoding/WinAnsiEncoding>>",
-    "<</Length #>>\nstream\n1 J 1 j\n2.8346 0 0 2.8346 0 0 cm\n%\nendstream",
-    "<</Title$>>",
+PAGE = (
+    "<</Type/Page/Parent 2 0 R/MediaBox[0 0 @ @]/Contents {} 0 R/Resources<</Font<</F1 4 0 R>>>>>>"
 )
-TABLE = r"xref\n0 7\n(?:\d{10} \d{5} [nf] \n){7}"
-TRAILER = "trailer\n<</Size 7/Root 1 0 R/Info 6 0 R>>\nstartxref\n#\n%%EOF\n"
+FONT = "<</Type/Font/Subtype/Type1/BaseFont/Helvetica/Encoding/WinAnsiEncoding>>"
+CONTENTS = "<</Length #>>\nstream\n1 J 1 j\n2.8346 0 0 2.8346 0 0 cm\n%\nendstream"
+TABLE = r"xref\n0 {0}\n(?:\d{{10}} \d{{5}} [nf] \n){{{0}}}"
+TRAILER = "trailer\n<</Size {}/Root 1 0 R/Info {} 0 R>>\nstartxref\n#\n%%EOF\n"
+KIDS, MOST_PAGES, ENDED = re.compile(r"/Kids\[([\d R]+)\]/Count (\d{1,3})>>"), 200, "\nendobj\n"
 PLACES = {"@": rf"({NUMBER})", "#": r"\d+", "%": r"([^\0]*)", "$": TEXT}
 FRAME = re.compile(rf"{NUMBER} w \[\] 0 d 20 10 m ({NUMBER}) 10 l \1 ({NUMBER}) l 20 \2 l h S")
 LINE = re.compile(
@@ -209,24 +208,48 @@ def _refuse_entity(one: Entity) -> None:
 
 
 def sheet_faults(blob: FileBytes) -> list[str]:
-    """What a drawing has that tbcad does not write; empty for none."""
+    """What a drawing, of one sheet or more, has that tbcad does not write; empty for none."""
     text = blob.data.tobytes().decode("cp1252", errors="replace")
-    found = _pattern().fullmatch(text)
-    if not found:
-        return [f"{blob.name}: other objects than one page of lines and texts"]
-    width, height, drawn = float(found[1]), float(found[2]), found[3].split("\n")
+    found = KIDS.search(text)
+    pages = min(int(found[2]), MOST_PAGES) if found else 1
+    *objects, end = text.split(ENDED)
+    forms = [*_forms(pages)]
+    size = len(forms) + 1
+    ended = re.fullmatch(TABLE.format(size) + _escaped(TRAILER.format(size, size - 1)), end)
+    if not ended or len(objects) != len(forms):
+        return [f"{blob.name}: other objects than pages of lines and texts"]
+    sizes, drawn = [], []
+    for number, (form, one) in enumerate(zip(forms, objects, strict=True), 1):
+        begin = "%PDF-1.4\n" * (number == 1)
+        match = re.fullmatch(_escaped(f"{begin}{number} 0 obj\n{form}"), one)
+        if not match:
+            return [f"{blob.name}: other objects than pages of lines and texts"]
+        sizes += [match.groups()] if form.startswith("<</Type/Page/") else []
+        drawn += [match[1].split("\n")] if form == CONTENTS else []
+    pages_of = zip(sizes, drawn, strict=True)
+    return [fault for page, lines in pages_of for fault in _page_faults(blob.name, page, lines)]
+
+
+def _page_faults(name: str, size: tuple[str, ...], drawn: list[str]) -> list[str]:
+    """What is wrong with a page of a size (points) and its lines; the frame is the first."""
     frame = FRAME.fullmatch(drawn[0])
     ends = [float(frame[k]) + BORDER_MM for k in (1, 2)] if frame else [math.nan, math.nan]
-    page = [side / POINTS_PER_MM for side in (width, height)]
+    page = [float(side) / POINTS_PER_MM for side in size]
     if not all(abs(end - side) < SAME_MM for end, side in zip(ends, page, strict=True)):
-        return [f"{blob.name}: a page of {page[0]:.0f} x {page[1]:.0f} mm, its frame is of another"]
+        return [f"{name}: a page of {page[0]:.0f} x {page[1]:.0f} mm, its frame is of another"]
     wrong = [line for line in drawn if not LINE.fullmatch(line) or HIDDEN.search(line)]
-    return [f"{blob.name}: {wrong[0][:40]!r} is neither a line nor a text"] if wrong else []
+    return [f"{name}: {wrong[0][:40]!r} is neither a line nor a text"] if wrong else []
 
 
-def _pattern() -> re.Pattern[str]:
-    objects = "".join(f"{k} 0 obj\n{one}\nendobj\n" for k, one in enumerate(OBJECTS, 1))
-    return re.compile(_escaped(f"%PDF-1.4\n{objects}") + TABLE + _escaped(TRAILER))
+def _forms(pages: int) -> Iterator[str]:
+    """Objects in their order: the first page is 3 and its contents are 5, then two a page."""
+    numbers = [3, *range(6, 2 * pages + 4, 2)]
+    yield "<</Type/Catalog/Pages 2 0 R>>"
+    yield f"<</Type/Pages/Kids[{' '.join(f'{k} 0 R' for k in numbers)}]/Count {pages}>>"
+    yield from (PAGE.format(5), FONT, CONTENTS)
+    for number in numbers[1:]:
+        yield from (PAGE.format(number + 1), CONTENTS)
+    yield "<</Title$>>"
 
 
 def _escaped(text: str) -> str:

@@ -243,7 +243,7 @@ def read_export(folder: Path) -> Export:
     digests = {name: blob.digest for name, blob in texts.items()}
     prototype = None
     if RECORD in manifest.files or (root / RECORD).exists():
-        prototype = read_prototype(root, cameras)
+        prototype = read_prototype(root, cameras, design.spec.prototype.motion.controller)
         if missing := design.spec.prototype.left_open():
             raise BadExport(f"{DESIGN}: spec.{missing[0]} has no value for the prototype; {AGAIN}")
         digests |= prototype.digests

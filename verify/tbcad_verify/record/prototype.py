@@ -5,6 +5,7 @@ A wrong form is refused here; wrong numbers are found by the checks.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
@@ -36,7 +37,10 @@ PLATE_HOLES, SAG = "plate_holes.csv", "sag.csv"
 BALLS, PLAN, STOPS, PROGRAM = "balls.csv", "rotation_plan.csv", "stops.csv", "rotation_plan.nc"
 SETTINGS = "grbl_settings.txt"
 KLIPPER, KLIPPER_CONFIG = "rotation_plan_klipper.gcode", "klipper.cfg"
-OPTIONAL = (PLATE_HOLES, SAG, KLIPPER, KLIPPER_CONFIG)
+OPTIONAL = (PLATE_HOLES, SAG)
+# Files of a controller by their fields; no other controller's may lie beside them.
+OF_GRBL = {"program": PROGRAM, "settings": SETTINGS}
+OF_KLIPPER = {"klipper": KLIPPER, "klipper_config": KLIPPER_CONFIG}
 MOST = 1000  # balls, parts or LEDs
 MOST_ROWS = 400_000
 LARGEST = 1e9
@@ -337,10 +341,10 @@ class Prototype(Strict):
     stops: Stops  # of the base
     sag: SagTable | None  # of the balls at the stops; None without the file
     plate_holes: PlateHoles | None  # of the base plate; None without the file
-    program: str  # text of the controller's program
-    settings: str  # text of the controller's settings
-    klipper: str | None  # text of the program for Klipper, and
-    klipper_config: str | None  # of its configuration; None without the file
+    program: str = ""  # text of the program of GRBL or grblHAL, and
+    settings: str = ""  # of its settings; empty with Klipper
+    klipper: str = ""  # text of the program for Klipper, and
+    klipper_config: str = ""  # of its configuration; empty with another controller
     digests: Mapping[str, tuple[int, str]]  # file name -> (size, sha256), of what was parsed
 
     @model_validator(mode="after")
@@ -372,14 +376,23 @@ class Prototype(Strict):
         return frozenset({*self.digests, *drawings, *panels, self.assembly.step, self.assembly.glb})
 
 
-def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
-    """Read prototype.json and its tables.
+def read_prototype(folder: Path, cameras: Collection[str], controller: str) -> Prototype:
+    """Read prototype.json, its tables, and program and settings of the design's controller.
 
     `cameras`: ids that the design has.
 
     BadExport: anything missing, foreign, malformed, not finite or absurd.
     """
-    names = (RECORD, BALLS, PLAN, STOPS, PROGRAM, SETTINGS)
+    programs, others = OF_GRBL, OF_KLIPPER
+    if controller == "klipper":
+        programs, others = others, programs
+    for name in others.values():
+        if os.path.lexists(folder / name):
+            raise BadExport(
+                f"{name} is not for {controller}, the design's controller: remove it, or build "
+                "again for the controller that you have"
+            )
+    names = (RECORD, BALLS, PLAN, STOPS, *programs.values())
     optional = [name for name in OPTIONAL if (folder / name).exists()]
     texts = {name: read(folder, name, MAX_TEXT_BYTES) for name in (*names, *optional)}
     value = parse_json(texts[RECORD], SCHEMA)
@@ -393,10 +406,7 @@ def read_prototype(folder: Path, cameras: Collection[str]) -> Prototype:
         "stops": Stops.read(texts[STOPS]),
         "sag": SagTable.read(texts[SAG]) if SAG in texts else None,
         "plate_holes": PlateHoles.read(texts[PLATE_HOLES]) if PLATE_HOLES in texts else None,
-        "program": texts[PROGRAM].text(),
-        "settings": texts[SETTINGS].text(),
-        "klipper": texts[KLIPPER].text() if KLIPPER in texts else None,
-        "klipper_config": texts[KLIPPER_CONFIG].text() if KLIPPER_CONFIG in texts else None,
+        **{field: texts[name].text() for field, name in programs.items()},
         "digests": {name: blob.digest for name, blob in texts.items()},
     }
     prototype = validated(RECORD, Prototype, value | tables)

@@ -129,7 +129,7 @@ class MotionSpec(Strict):
     """How the base is driven from stop to stop: motion, trigger and controller."""
 
     axis: Literal["X", "A"]
-    controller: Literal["grblhal", "grbl"]
+    controller: Literal["grblhal", "grbl", "klipper"]
     trigger: Literal["coolant", "pause"]
     home_deg: float = Field(ge=-180, le=180)
     home_trim_deg: float = Field(ge=-5, le=5)

@@ -191,17 +191,19 @@ def assembly(
     Each step names its parts by their numbers in the list, torque or fit, and what to check. Exit
     code 0, or 2 for bad input.
     """
+    from tbcad.prototype.assembly_steps.instructions import instructions
     from tbcad.prototype.assembly_steps.machine import read_machine
-    from tbcad.prototype.assembly_steps.steps import assembly_steps, record
+    from tbcad.prototype.assembly_steps.steps import record
     from tbcad.report.assembly_page import write_page
 
     check_is_folder(folder)
     machine = read_machine(folder)
-    steps = assembly_steps(machine)
+    told = instructions(machine)
+    steps = told.steps
     if json:
         print_json({"steps": record(steps)})
         return 0
-    file = write_page(folder, out, machine, steps, pictures=pictures, force=force)
+    file = write_page(folder, out, told, pictures=pictures, force=force)
     typer.echo(f"{file}: {len(steps)} steps, {sum(machine.bill.quantities.values())} parts")
     return 0
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control.gcode_machine import run_program
-from tbcad_verify.prototype.control.program_checks import PULL_OFF_DEG, homing
+from tbcad_verify.prototype.control.program_checks import PULL_OFF_DEG, homing, is_klipper
 from tbcad_verify.prototype.drive_checks import FULL_STEPS, gear_of
 from tbcad_verify.record.prototype import SETTINGS
 from tbcad_verify.report.checks import Check, CheckName, Unknown, no_faults, require
@@ -162,7 +162,12 @@ def _arc(azimuth: Floats) -> tuple[float, float]:
 
 
 def settings_faults(context: PrototypeContext, ratio: float) -> Iterator[str]:
-    """Settings that are missing, foreign, or unlike what gear, motion and program need."""
+    """Settings that are missing, foreign, or unlike what gear, motion and program need.
+
+    Klipper has none.
+    """
+    if is_klipper(context):
+        return
     values, faults = parsed_settings(context.prototype.settings)
     yield from faults
     motion = context.export.spec.prototype.motion

@@ -1,4 +1,4 @@
-"""Both programs against the plan: every photograph once, at its angle, at rest, from below.
+"""The program against the plan: every photograph once, at its angle, at rest, from below.
 
 What a program does is taken from a machine that runs it; what it has to do, from the stops and
 from the motion that the design asks for.
@@ -35,9 +35,9 @@ from tbcad_verify.prototype.control.gcode_machine import (
     run_program,
 )
 from tbcad_verify.prototype.drive_checks import FULL_STEPS, gear_of
-from tbcad_verify.record.prototype import KLIPPER, KLIPPER_CONFIG
+from tbcad_verify.record.prototype import KLIPPER_CONFIG
 from tbcad_verify.record.spec import MotionSpec
-from tbcad_verify.report.checks import Check, CheckName, at_most, no_faults, require
+from tbcad_verify.report.checks import Check, CheckName, no_faults
 from tbcad_verify.step.solids_text import TextSolid
 
 PROGRAM_DEG = 1.0001e-4  # the digits of angles in the program
@@ -45,7 +45,7 @@ PROGRAM_DIGITS = 4
 PROGRAM_S = 5.1e-4  # of durations
 SHARE = 1e-5  # of other numbers, which have six digits
 RUNS = 2  # one for each turn of the object
-PAUSES = {"grblhal": ["pin", "turn"], "grbl": ["base", "turn"]}
+PAUSES = {"grblhal": ["pin", "turn"], "grbl": ["base", "turn"], "klipper": ["pin", "turn"]}
 PULL_OFF_DEG = 2.0
 NUMBER = r"-?\d+(?:\.\d+)?"
 BASE = "MANUAL_STEPPER STEPPER=base"
@@ -85,12 +85,15 @@ CONFIG = (
 )
 FIGURE_SHARE = 1e-5
 SAME_DEG = 2.1e-4
-FILE = KLIPPER
+FILE = KLIPPER_CONFIG
 CHECKS = {"klipper": "faults"}
 
 
 def program_faults(context: PrototypeContext) -> Iterator[str]:
     """What is wrong with the program, and what it does otherwise than the plan."""
+    if is_klipper(context):
+        yield from klipper_faults(context)
+        return
     machine = run_program(context.prototype.program, *homing(context))
     yield from [*machine.faults, *deviations(context, machine)]
 
@@ -176,7 +179,7 @@ def _travel(context: PrototypeContext, machine: Machine) -> Iterator[str]:
         yield f"drives axis {machine.axis or 'none'}"
     if machine.pauses != pauses:
         yield f"pauses for {', '.join(machine.pauses) or 'nothing'}, not for {', '.join(pauses)}"
-    if machine.homes != (motion.controller == "grblhal"):
+    if machine.homes != (motion.controller != "grbl"):
         yield f"homes {machine.homes} times"
     for angle in machine.bases:
         if not math.isclose(angle, motion.home_deg, rel_tol=SHARE):
@@ -198,16 +201,19 @@ def _travel(context: PrototypeContext, machine: Machine) -> Iterator[str]:
 def checks(
     names: list[CheckName], context: PrototypeContext, solids: Mapping[str, TextSolid]
 ) -> list[Check]:
-    """Angles, lights, times and pauses of all photographs; lines of the configuration."""
-    if context.export.spec.prototype.motion.controller == "grbl":
-        return [at_most(names[0], 0, 0)]
-    faults = [*klipper_faults(context), *config_faults(context, gear_of(context, solids).ratio)]
-    return [no_faults(names[0], faults)]
+    """Lines of the configuration; no other controller has one."""
+    ratio = gear_of(context, solids).ratio
+    return [no_faults(names[0], [*config_faults(context, ratio)] if is_klipper(context) else [])]
+
+
+def is_klipper(context: PrototypeContext) -> bool:
+    """Whether the design's controller is Klipper."""
+    return context.export.spec.prototype.motion.controller == "klipper"
 
 
 def klipper_faults(context: PrototypeContext) -> Iterator[str]:
-    """What the machine of the controller's program finds wrong when it does the same."""
-    text = require(context.prototype.klipper, f"there is no {KLIPPER}")
+    """What is wrong with Klipper's program, run by the machine that runs G-code."""
+    text = context.prototype.klipper
     motion, (switch, homed) = context.export.spec.prototype.motion, homing(context)
     machine = run_klipper(text, motion.axis, switch, switch + motion.home_trim_deg)
     yield from machine.faults
@@ -256,7 +262,7 @@ def _parsed(line: str) -> tuple[dict[str, float], str] | None:
 
 def config_faults(context: PrototypeContext, ratio: float) -> Iterator[str]:
     """The first line that is another; what its comments tell is obeyed by people."""
-    text = require(context.prototype.klipper_config, f"there is no {KLIPPER_CONFIG}")
+    text = context.prototype.klipper_config
     lines = text.splitlines()
     forms: list[str | tuple[str, float]] = [*CONFIG, *_steps(context, ratio)]
     for name in ("release", "lamp", *(f"led_{k + 1}" for k in range(len(context.prototype.leds)))):

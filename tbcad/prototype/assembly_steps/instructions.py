@@ -1,0 +1,133 @@
+"""All that a maker reads of an assembly, once: the page and the PDF show the same words.
+
+Times are sums of minutes for each thing that is done; none is measured, and the words say so.
+"""
+
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from tbcad.cad.formats.checked_files import Row
+from tbcad.prototype.assembly_steps.machine import OWN, AssembledMachine
+from tbcad.prototype.assembly_steps.steps import SCREWED, Step, Use, assembly_steps
+from tbcad.prototype.files.bom import totals
+
+EXAMPLE = re.compile(r" \(such as [^)]*\)")  # a maker's number, which nothing depends on
+ROUND_MIN = 5.0  # that times are rounded to
+MIN_PER_H = 60.0
+
+
+@dataclass(frozen=True)
+class Instructions:
+    """How a prototype is assembled."""
+
+    about: tuple[str, ...]  # paragraphs at the beginning
+    tools: tuple[str, ...]  # of the whole assembly
+    steps: tuple[Step, ...]  # each of a subassembly, in order
+    designations: dict[int, str]  # of each part of the list, without a supplier's number
+    minutes: dict[str, float]  # of work, by keys of steps
+    times: tuple[str, ...]  # what the minutes are, and are not
+    step_tools: dict[str, tuple[str, ...]]  # by keys of steps
+    tested: tuple[tuple[str, str], ...]  # what it works with, and how far that was tried
+    not_drawn: tuple[str, ...]  # parts without a body, and why
+
+    def uses(self, step: Step) -> list[tuple[str, ...]]:
+        """Number, quantity, name and designation of each part that a step takes."""
+        return [
+            (str(use.item), str(use.quantity), use.part, self.designations[use.item])
+            for use in step.parts
+        ]
+
+
+def instructions(machine: AssembledMachine) -> Instructions:
+    """The instructions for a prototype. InputError: as `assembly_steps`."""
+    words, steps = _words(), assembly_steps(machine)
+    kinds = {machine.kind(part) for part in machine.bill.items}
+    each = ", ".join(f"{what} {value:g}" for what, value in words["minutes"].items())
+    hours = totals(machine.bill.rows)["print_hours"]
+    return Instructions(
+        about=tuple(words["about"]),
+        tools=(
+            *words["tools"],
+            *(tool for kind, tool in words["tools_of_kinds"].items() if kind in kinds),
+        ),
+        steps=steps,
+        designations={int(row["item"] or 0): designation(row) for row in machine.bill.rows},
+        minutes={step.key: work_minutes(machine, step) for step in steps},
+        times=tuple(text.format(print_hours=hours, minutes=each) for text in words["times"]),
+        step_tools={step.key: tuple(dict.fromkeys(_tools(machine, step))) for step in steps},
+        tested=tuple((what, result) for what, result in words["tested"]),
+        not_drawn=tuple(_not_drawn(machine, steps)),
+    )
+
+
+def designation(row: Row) -> str:
+    """What a part of the list is, by standards and sizes: without the number of a supplier."""
+    return EXAMPLE.sub("", str(row["what"]))
+
+
+def work_minutes(machine: AssembledMachine, step: Step) -> float:
+    """Minutes of one person for a step: each instruction, check, part and hole."""
+    each = _words()["minutes"]
+    counts = Counter({"instructions": len(step.does), "checks": len(step.checks)})
+    for use in step.parts:
+        counts[_work(machine, use)] += use.quantity
+        if machine.kind(use.part) == "plates":
+            counts["holes"] += sum(
+                "plate" in one.through and machine.kind(one.part) in SCREWED
+                for one in machine.fasteners
+            )
+    if step.key == "wiring":
+        counts["lines of wiring"] += len(machine.wiring)
+    return float(sum(each[what] * count for what, count in counts.items()))
+
+
+def hours_text(minutes: float) -> str:
+    """A time, rounded: such as 25 min or 2 h 10 min."""
+    whole = round(max(minutes, ROUND_MIN) / ROUND_MIN) * int(ROUND_MIN)
+    hours, rest = divmod(whole, int(MIN_PER_H))
+    return " ".join([f"{hours} h"] * (hours > 0) + [f"{rest} min"] * (rest > 0))
+
+
+def _work(machine: AssembledMachine, use: Use) -> str:
+    """What is done with a part: by its kind, and by its body where it is in no list."""
+    if (kind := machine.kind(use.part)) != OWN:
+        return kind
+    if not use.bodies or not machine.is_printed(use.bodies[0]):
+        return "balls"
+    caps = {one.name for one in machine.record.with_role("cap")}
+    return "caps" if use.bodies[0] in caps else "printed parts"
+
+
+def _tools(machine: AssembledMachine, step: Step) -> Iterator[str]:
+    """Keys by thread, then what parts of a kind need."""
+    words = _words()
+    for use in step.parts:
+        part, kind = machine.listed(use.part), machine.kind(use.part)
+        if part and kind in SCREWED:
+            size = words["keys"][kind].get(f"{part['thread_mm']:g}")
+            yield f"hexagon key {size}" if size else "screwdriver"
+    for use in step.parts:
+        part, kind = machine.listed(use.part), machine.kind(use.part)
+        if tool := words["step_tools"].get(kind):
+            width = f"{part['width_mm']:g}" if part and kind == "nuts" else ""
+            yield from tool.format(nut=width).split(", ")
+
+
+def _not_drawn(machine: AssembledMachine, steps: tuple[Step, ...]) -> Iterator[str]:
+    """Parts without a body, by the reason, which there is for each kind."""
+    reasons, kinds = _words()["without_body"], dict[str, list[str]]()
+    for use in (use for step in steps for use in step.parts if not use.bodies):
+        kinds.setdefault(reasons[machine.kind(use.part)], []).append(machine.ref(use.part))
+    yield from (f"{', '.join(dict.fromkeys(parts))}: {why}" for why, parts in kinds.items())
+
+
+@cache
+def _words() -> dict[str, Any]:
+    place = files("tbcad.prototype.assembly_steps") / "instructions.toml"
+    return tomllib.loads(place.read_text(encoding="utf-8"))

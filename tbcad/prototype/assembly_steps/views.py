@@ -1,0 +1,219 @@
+"""Line pictures of the steps of assembly: new parts apart from their places, others thin."""
+
+from collections.abc import Callable, Iterable, Mapping
+from itertools import product
+
+import numpy as np
+import trimesh
+from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+from tbcad.cad.drafting.callouts import EDGE, PIXELS, balloons
+from tbcad.cad.drafting.line_pictures import LinePicture, axes_toward, line_picture
+from tbcad.cad.drafting.sheet import Box
+from tbcad.cad.formats.entities import Entity, Layer, Line, Point, Polyline
+from tbcad.prototype.assembly_steps.exploded import offsets
+from tbcad.prototype.assembly_steps.machine import AssembledMachine
+from tbcad.prototype.assembly_steps.steps import Step
+from tbcad.types import Floats, Ints
+
+Bodies = Mapping[str, trimesh.Trimesh]
+FILLED, CONTEXT = 0.94, 0.45  # share of the room that new parts fill, and of all that is shown
+PIECE_MM = 0.4  # on paper, of edges that are tested as one
+# Directions to look from, degrees; their worth, since people look from above and from a corner.
+AZIMUTHS, ELEVATIONS = range(-135, 181, 45), {20: 1.0, 50: 0.95, -25: 0.8, -55: 0.7}
+SQUARE_DEG, SQUARE_WORTH = 90, 0.55  # lines do not tell what is in front
+GRID = 50  # rays along the longer side, to see what is seen from a direction
+DECIMALS = 2  # of a place on paper, mm
+EXPLODED_EYE, APART = (1.0, -1.0, 0.45), 0.5  # share of its place that what stands still is moved
+HIDING = ("shroud_", "capture_sphere", "camera_view")
+
+
+def step_picture(machine: AssembledMachine, step: Step, bodies: Bodies, room: Box) -> list[Entity]:
+    """The picture of a step in a room on paper, mm, with the numbers of its parts.
+
+    Nothing where no body of the step is drawn.
+    """
+    new = frozenset(name for use in step.parts for name in use.bodies if name in bodies)
+    if not new:
+        return []
+    moved = offsets(machine, new)
+    shown = {
+        name: _moved(bodies[name], moved.get(name, np.zeros(3)))
+        for name in sorted({*new, *step.near} & bodies.keys())
+    }
+    groups = [[name for name in use.bodies if name in new] for use in step.parts]
+    axes = axes_toward(_best_eye(shown, [group for group in groups if group]))
+    listed = [(use.item, group) for use, group in zip(step.parts, groups, strict=True)]
+    return _drawn(shown, new, axes, listed, room)
+
+
+def whole_picture(machine: AssembledMachine, bodies: Bodies, room: Box) -> list[Entity]:
+    """All parts but shroud and fasteners, apart."""
+    fasteners = {one.name for one in machine.fasteners}
+    tools = {one.name for one in machine.record.with_role("tool")}
+    new = frozenset(
+        name
+        for name in machine.bodies.keys() & bodies.keys()
+        if not name.startswith(HIDING) and name not in fasteners | tools
+    )
+    turning = {one.name for one in machine.record.bought if one.turns}
+    turning |= {one.name for one in machine.record.with_role("base", "cap")}
+    moved = offsets(machine, new)
+    for name in new - turning:
+        if not name.startswith("ball_"):
+            moved[name] = moved[name] + APART * bodies[name].bounds.mean(axis=0)
+    shown = {name: _moved(bodies[name], moved[name]) for name in sorted(new)}
+    names: dict[int, list[str]] = {}
+    for name in sorted(new):
+        if part := machine.bodies[name]:
+            names.setdefault(machine.bill.items[part], []).append(name)
+    return _drawn(shown, new, axes_toward(EXPLODED_EYE), sorted(names.items()), room)
+
+
+def _moved(mesh: trimesh.Trimesh, way: Floats) -> trimesh.Trimesh:
+    found = mesh.copy()
+    found.apply_translation(way)
+    return found
+
+
+def _drawn(
+    shown: Bodies,
+    new: frozenset[str],
+    axes: Floats,
+    listed: Iterable[tuple[int, list[str]]],
+    room: Box,
+) -> list[Entity]:
+    """Lines in the room that balloons leave, and a balloon for each kind of part that is seen."""
+    left, low, right, high = room
+    edge = 2 * EDGE / PIXELS
+    inner = (left + edge, low, right - edge, high)
+    middle, scale = _fitted(shown, new, axes, inner)
+    picture = line_picture(shown, axes, PIECE_MM / scale, shown.keys() - new)
+    centre = np.array([inner[0] + inner[2], inner[1] + inner[3]]) / 2
+    on_paper = _placing(centre - scale * middle, scale)
+    lines = [
+        Line(one.layer, *clipped)
+        for one in picture.lines
+        if (clipped := _clipped(on_paper(one.start), on_paper(one.end), inner))
+    ]
+    points = list(_anchors(picture, listed, on_paper, inner))
+    return [*_chained(lines), *balloons(points, room)]
+
+
+def _fitted(shown: Bodies, new: frozenset[str], axes: Floats, room: Box) -> tuple[Floats, float]:
+    """Middle of the new parts in the picture's plane, and the scale at which they fit, (2,)."""
+    least, most = _reach(shown, shown.keys(), axes)
+    low, high = _reach(shown, new, axes)
+    size = np.maximum(high - low, CONTEXT * (most - least))
+    space = np.array([room[2] - room[0], room[3] - room[1]])
+    return (low + high) / 2, float(FILLED * (space / np.maximum(size, 1.0)).min())
+
+
+def _reach(bodies: Bodies, names: Iterable[str], axes: Floats) -> tuple[Floats, Floats]:
+    points = np.vstack([bodies[name].vertices for name in sorted(names)]) @ axes[:2].T
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _placing(origin: Floats, scale: float) -> Callable[[Point], Point]:
+    left, low = origin.tolist()
+    return lambda point: (
+        round(left + scale * point[0], DECIMALS),
+        round(low + scale * point[1], DECIMALS),
+    )
+
+
+def _anchors(
+    picture: LinePicture,
+    listed: Iterable[tuple[int, list[str]]],
+    on_paper: Callable[[Point], Point],
+    room: Box,
+) -> Iterable[tuple[int, Point]]:
+    """A visible point in the room of one body of each kind of part."""
+    for item, names in listed:
+        places = (on_paper(picture.anchors[name]) for name in names if name in picture.anchors)
+        found = next((place for place in places if _inside(place, room)), None)
+        if found is not None:
+            yield item, found
+
+
+def _inside(point: Point, room: Box) -> bool:
+    return room[0] <= point[0] <= room[2] and room[1] <= point[1] <= room[3]
+
+
+def _clipped(start: Point, end: Point, room: Box) -> tuple[Point, Point] | None:
+    """What of a line is in a room (Liang and Barsky); None without any."""
+    if _inside(start, room) and _inside(end, room):
+        return (start, end) if start != end else None
+    way, first, last = (end[0] - start[0], end[1] - start[1]), 0.0, 1.0
+    for k in (0, 1):
+        for sign, limit in ((-1.0, room[k]), (1.0, room[k + 2])):
+            along, off = sign * way[k], sign * (limit - start[k])
+            if along == 0.0:
+                if off < 0.0:
+                    return None
+            elif along < 0.0:
+                first = max(first, off / along)
+            else:
+                last = min(last, off / along)
+    if first >= last:
+        return None
+    ends = [
+        (round(start[0] + t * way[0], DECIMALS), round(start[1] + t * way[1], DECIMALS))
+        for t in (first, last)
+    ]
+    return (ends[0], ends[1]) if ends[0] != ends[1] else None
+
+
+def _chained(lines: Iterable[Line]) -> list[Entity]:
+    """Lines that meet end to end as polylines, each line once."""
+    left = dict.fromkeys(Line(one.layer, *sorted((one.start, one.end))) for one in lines)
+    meeting: dict[tuple[Layer, Point], list[Line]] = {}
+    for one in left:
+        for end in (one.start, one.end):
+            meeting.setdefault((one.layer, end), []).append(one)
+    drawn: list[Entity] = []
+    while left:
+        one = next(iter(left))
+        del left[one]
+        corners = [one.start, one.end]
+        while follow := [two for two in meeting[one.layer, corners[-1]] if two in left]:
+            del left[follow[0]]
+            corners.append(_other_end(follow[0], corners[-1]))
+        drawn.append(Polyline(one.layer, tuple(corners), closed=False))
+    return drawn
+
+
+def _other_end(line: Line, end: Point) -> Point:
+    return line.end if line.start == end else line.start
+
+
+def _best_eye(bodies: Bodies, groups: list[list[str]]) -> Floats:
+    """The direction from which most kinds of new parts are seen."""
+    names = sorted(bodies)
+    rays = RayMeshIntersector(trimesh.util.concatenate([bodies[name] for name in names]))
+    owner = np.repeat(np.arange(len(names)), [len(bodies[name].faces) for name in names])
+    numbers = [[names.index(name) for name in group] for group in groups]
+    eyes, worth, seen = [], [], []
+    for (elevation, value), azimuth in product(ELEVATIONS.items(), AZIMUTHS):
+        turn, up = np.radians(azimuth), np.radians(elevation)
+        eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+        counts = np.bincount(_seen(rays, owner, bodies, eye), minlength=len(names))
+        eyes.append(eye)
+        worth.append(value * (SQUARE_WORTH if azimuth % SQUARE_DEG == 0 else 1.0))
+        seen.append([max(counts[group]) for group in map(np.array, numbers)])
+    area = np.array(seen, dtype=np.float64)
+    scores = np.sqrt(area / np.maximum(area.max(axis=0), 1.0)).sum(axis=1)
+    return eyes[int(np.argmax(scores * np.array(worth)))]
+
+
+def _seen(rays: RayMeshIntersector, owner: Ints, bodies: Bodies, eye: Floats) -> Ints:
+    """Numbers of the bodies that a grid of rays from a direction meets first."""
+    axes = axes_toward(eye)
+    low, high = _reach(bodies, bodies, axes)
+    step = float((high - low).max()) / GRID
+    x, y = (np.arange(low[k] + step / 2, high[k], step) for k in (0, 1))
+    flat = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
+    far = max(float((one.vertices @ eye).max()) for one in bodies.values()) + 1.0
+    start = flat @ axes[:2] + far * eye
+    hit = rays.intersects_first(start, np.broadcast_to(-eye, start.shape))
+    return np.asarray(owner[hit[hit >= 0]])
