@@ -10,16 +10,16 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.arrangement import PrototypeModel
 from tbcad.prototype.base.caps import cap_limits, holding
-from tbcad.prototype.drive.balance import BaseBalance, power_off, stop_sequence
+from tbcad.prototype.drive.balance import BaseBalance, stop_sequence, travel_ends
 from tbcad.prototype.drive.drive import (
     HOLD_MARGIN,
     MAX_RISE_K,
     MAX_WIND_UP_DEG,
-    SELF_LOCKING,
     Drive,
     base_torques,
     drive_loads,
 )
+from tbcad.prototype.drive.power_off import power_off
 from tbcad.prototype.electronics import phases
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import totals
@@ -57,7 +57,6 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
     layout, spec, frame = built.layout, built.spec.prototype, built.frame
     homing, stock, leds = frame.of(HomingLayout), frame.of(Stock), len(built.stage.leds)
     angles = homing.angles
-    low, high = np.radians([angles.switch, angles.switch + angles.travel]).tolist()
     axis, zero, third = (layout.array.ellipsoid.frame() + 0.0).tolist()
     return Prototype(
         camera="a",
@@ -111,9 +110,7 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         ),
         assembly=records.AssemblyFiles(step=STEP, glb=GLB),
         drive=drive_record(built.balance, built.drive, spec.motion, layout.stops.range),
-        power_off=power_off(
-            built.balance, low, high, holds_itself=built.drive.efficiency < SELF_LOCKING
-        ),
+        power_off=power_off(built.drive, built.balance, travel_ends(layout, spec.motion)),
     )
 
 

@@ -20,7 +20,7 @@ KINDS = (
     *("motors", "stages", "wheels", "belts", "couplings", "shafts", "bearings", "screws"),
     *("setscrews", "inserts", "dowels", "magnets", "leds", "strips", "sheets", "resistors"),
     *("wires", "connectors", "electronics", "extrusions", "tnuts", "nuts", "washers"),
-    *("collars", "plates"),
+    *("collars", "spacers", "brakes", "plates"),
 )
 """Lists of parts, in the order in which they are listed. Their own columns are sizes above zero.
 
