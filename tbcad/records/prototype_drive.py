@@ -17,9 +17,10 @@ class Phase(RecordSection):
 
 
 class Controller(RecordSection):
-    """The controller of motion and lights, and the photographs of a stop in order."""
+    """The controller of motion and lights, its board, and the photographs of a stop in order."""
 
     firmware: Literal["grblhal", "grbl"]
+    board: str
     axis: Literal["X", "A"]
     phases: tuple[Phase, ...] = Field(min_length=1)
 

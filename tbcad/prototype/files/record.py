@@ -20,7 +20,7 @@ from tbcad.prototype.drive.drive import (
     drive_loads,
 )
 from tbcad.prototype.drive.power_off import power_off
-from tbcad.prototype.electronics import phases
+from tbcad.prototype.electronics import Wiring, phases
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import totals
 from tbcad.prototype.frame.camera_gauge import CameraGauge, marks_seen
@@ -76,7 +76,10 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         ),
         calibration=_calibration(built),
         controller=Controller(
-            firmware=spec.motion.controller, axis=spec.motion.axis, phases=phases(leds, spec.motion)
+            firmware=spec.motion.controller,
+            board=frame.of(Wiring).board.name,
+            axis=spec.motion.axis,
+            phases=phases(leds, spec.motion),
         ),
         caps=cap_limits(built.spec, built.base, layout),
         camera_place=_camera_place(built),
