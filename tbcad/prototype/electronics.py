@@ -2,9 +2,9 @@
 
 The board is the first in boards.csv that has an output for each light and one for the coolant
 function, which releases the camera. A light's circuit: supply, resistor, LED, output to ground;
-an output that bears less than the light's current switches a module that does. An LED's two wires go from its
-pocket through the grooves of arm and crown, down the post, and out of the foot's channel, to a
-connector; resistors (IEC 60063) and switch modules are beside the controller.
+an output that bears less than the light's current switches a module that does. An LED's two wires
+go from its pocket through the grooves of arm and crown, down the post, and out of the foot's
+channel, to a connector; resistors (IEC 60063) and switch modules are beside the controller.
 
 GRBL 1.1 has two outputs only, for spindle and coolant. grblHAL, FluidNC and LinuxCNC number digital
 outputs from 0 and switch them by M64 P (on) and M65 P (off), at once when the line is read; a dwell

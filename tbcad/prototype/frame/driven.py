@@ -290,7 +290,7 @@ def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: PartsList) -> Sheet
     angle = float(np.degrees(np.arctan2(places[0][1], places[0][0])))
     on_holes = f"{len(holes)} x Ø<> on Ø{circle:g}"
     text = (
-        f"{part['teeth']:g} teeth, pitch {part['pitch_mm']:g}, {part['width_mm']:g} thick over its rims.",
+        f"{part['teeth']:g} teeth, pitch {part['pitch_mm']:g}, {part['width_mm']:g} over the rims.",
         f"{len(holes)} x Ø{SCREW_MM:g} through on a circle of Ø{circle:g} ± 0.1,",
         f"the first at {angle:.0f}°, the others {360 / len(holes):g}° apart.",
         "Drill from the flat side that lies against the",

@@ -1,9 +1,10 @@
 """The base's place along its axis: what lies in contact from the hub to the head and back.
 
-Zero disc, wheel, spacer and inner ring of the front bearing on one side, inner ring of the rear bearing and
-collar on the other: their ends, from the corners of the assembly's solids. A spacer that is wider
-than the inner ring's shoulder would rub on the shield; the shoulder is taken at 0.3 of the way from
-bore to outer diameter (608: 12.2, 6000: 14.8, 6001: 16.8 mm; makers' sheets: 12.1, 14.8, 17.0).
+Zero disc, wheel, spacer and inner ring of the front bearing on one side, inner ring of the rear
+bearing and collar on the other: their ends, from the corners of the assembly's solids. A spacer
+that is wider than the inner ring's shoulder would rub on the shield; its radius is
+taken at 0.3 of the way from bore to outer one (608: 12.2 mm across, 6000: 14.8, 6001: 16.8; makers'
+sheets: 12.1, 14.8, 17.0).
 """
 
 from __future__ import annotations

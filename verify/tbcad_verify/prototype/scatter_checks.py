@@ -1,9 +1,9 @@
 """What the roughness of the balls leaves of the picture's contrast, by their grades.
 
 A surface of roughness Rq sends 1 - exp(-(4 pi Rq cos(theta) / lambda)^2) of what it reflects past
-the mirror's direction (total integrated scatter: Bennett and Porteus 1961; Beckmann). Rq is 1.25 Ra,
-as of normally distributed heights, and Ra the limit of the grade: balls on sale are often better.
-What is scattered is a veil. If half of what shines on a ball from the directions that it is
+the mirror's direction (total integrated scatter: Bennett and Porteus 1961; Beckmann). Rq is 1.25
+Ra, as of normally distributed heights, and Ra the limit of the grade: balls on sale are often
+better. What is scattered is a veil. If half of what shines on a ball from the directions that it is
 scattered to is white and half is black, their contrast is what is not scattered.
 """
 
@@ -41,6 +41,4 @@ def checks(names: list[CheckName], context: PrototypeContext) -> list[Check]:
 
 def scattered(ra_um: Floats, cosine: Floats) -> Floats:
     """Total integrated scatter of surfaces of Ra (N,) at cosines of incidence (N,)."""
-    return np.asarray(
-        -np.expm1(-((4 * np.pi * RQ_OVER_RA * ra_um * cosine / WAVELENGTH_UM) ** 2))
-    )
+    return np.asarray(-np.expm1(-((4 * np.pi * RQ_OVER_RA * ra_um * cosine / WAVELENGTH_UM) ** 2)))

@@ -48,7 +48,7 @@ Masses = Annotated[Floats, numbers_or_empty(0, LARGEST)]
 Names = Annotated[NDArray[np.str_], column(Name, np.str_)]
 Kinds = Annotated[NDArray[np.str_], column(Literal["ball", "cap"], np.str_)]
 GRADE_NAMES = *(f"G{one}" for one in (3, 5, 10, 16, 20, 24, 28, 40, 60, 100, 200)), ""
-Grades = Annotated[NDArray[np.str_], column(Literal[GRADE_NAMES], np.str_)]  # type: ignore[valid-type]
+Grades = Annotated[NDArray[np.str_], column(Literal[GRADE_NAMES], np.str_)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 
 
