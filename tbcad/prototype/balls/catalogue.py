@@ -34,14 +34,16 @@ class StockBall:
     source: str  # where these figures come from
 
     def bought_grade(self, coarsest: str) -> str | None:
-        """The best grade it is sold in, from FINEST or a finer coarsest one on; None without one.
+        """The best grade from FINEST to the coarsest that it is sold in, or else a finer one.
 
-        ISO 3290-1 limits the roughness of a grade, and with it the light that a ball scatters.
+        None when it is sold in coarser ones only. ISO 3290-1 limits the roughness of a grade, and
+        with it the light that a ball scatters.
         """
         names = [*load_grades()]
         last = names.index(coarsest)
-        from_best = names[min(names.index(FINEST), last) : last + 1]
-        return next((grade for grade in from_best if grade in self.grades), None)
+        first = min(names.index(FINEST), last)
+        wanted = (*names[first : last + 1], *reversed(names[:first]))
+        return next((grade for grade in wanted if grade in self.grades), None)
 
 
 COLUMNS = tuple(field.name for field in fields(StockBall))

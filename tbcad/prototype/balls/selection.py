@@ -95,7 +95,6 @@ BISECTION_STEPS = 40
 # Coverages are equal up to this rounding, far below what the smallest step of stock changes.
 COVERAGE_ROUNDING_MM = 1e-6
 CAP_STEP_MM = 0.1  # radii of caps are multiples of this
-CAP_WORTH = 1.05  # least radius of a cap over the largest ball's: as far apart as stock is
 CAP = -1  # in place of a place in the catalogue
 # The radius of a cap is searched up to this multiple of the mean radius of its group.
 MAX_CAP_RADIUS = 10
@@ -283,7 +282,7 @@ def _covering(
         return radius, stock
     steps = _largest_cap(candidates.only(beyond[groups.group_of]), radius, ignored, moved)
     cap = steps * CAP_STEP_MM
-    beyond &= cap > CAP_WORTH * radius
+    beyond &= cap > radius
     return np.where(beyond, cap, radius), np.where(beyond, CAP, stock)
 
 
