@@ -87,7 +87,7 @@ def small_envelope(small_design: MirrorDesign) -> Envelope:
 def low_resolution_design() -> MirrorDesign:
     """The small one for photographs of few pixels, with five balls."""
     options = ["n=6", "camera.width_px=416", "camera.height_px=310", "prototype.k=5"]
-    return mirror_design(*options, "prototype.largest_ball_mm=60")
+    return mirror_design(*options, "prototype.largest_ball_mm=60", "prototype.grade=G40")
 
 
 @pytest.fixture(scope="session")

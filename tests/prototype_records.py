@@ -51,6 +51,7 @@ def prototype_document(**changes: Any) -> Record:
         **dict.fromkeys(("calibration", "camera_place", "lamps", "shroud"), None),
         "controller": {
             "firmware": "grblhal",
+            "board": "OCTOPUS-PRO-1.1",
             "axis": "X",
             "phases": [{"name": "dark", "output": None}],
         },
@@ -67,7 +68,7 @@ def prototype_document(**changes: Any) -> Record:
         },
         "assembly": {"step": "prototype.step", "glb": "prototype.glb"},
         "drive": drive_section(),
-        "power_off": dict.fromkeys(PowerOff.model_fields, 0.0),
+        "power_off": dict.fromkeys(PowerOff.model_fields, 0.0) | {"brake": None},
     }
     document["holding"]["balls"] = []
     ordered = [field.alias or name for name, field in Prototype.model_fields.items()]

@@ -31,8 +31,10 @@ from tbcad.prototype.drive.balance import (
     ball_masses,
     home_angles,
     sum_masses,
+    travel_ends,
 )
 from tbcad.prototype.drive.drive import Drive, base_torques, choose_drive, load_drives
+from tbcad.prototype.drive.power_off import with_brake
 from tbcad.prototype.electronics import led_circuit
 from tbcad.prototype.fasteners import Fastener, numbered
 from tbcad.prototype.frame.camera_mount import CameraMount, check_camera
@@ -123,11 +125,13 @@ def balance_and_drive(
 ) -> tuple[BaseBalance, Drive]:
     """The balance of balls and carrier, and the drive that turns them.
 
-    SpecError: no drive is strong enough.
+    SpecError: no drive is strong enough, or no brake holds the base without power.
     """
     balance = sum_masses(base.frame, ball_masses(layout, spec.printer.density_g_cm3), carrier)
     torques = base_torques(balance, layout.stops.range, spec.prototype.motion)
-    return balance, choose_drive(spec.prototype.base.drive, torques, load_drives(parts))
+    drive = choose_drive(spec.prototype.base.drive, torques, load_drives(parts))
+    travel = travel_ends(layout, spec.prototype.motion)
+    return balance, with_brake(drive, balance, travel, parts)
 
 
 Outcome = tuple[Spec, PrototypeModel | SpecError]

@@ -1,8 +1,10 @@
-"""The electronics: outputs of the controller, resistors of LEDs, and what is wired, line by line.
+"""The electronics: the controller's board and outputs, resistors of LEDs, and what is wired.
 
-A light's circuit: supply, resistor, LED, switch module to ground. An LED's two wires go from its
-pocket through the grooves of arm and crown, down the post, and out of the foot's channel, to a
-connector; resistors (IEC 60063) and switch modules are beside the controller.
+The board is the first in boards.csv that has an output for each light and one for the coolant
+function, which releases the camera. A light's circuit: supply, resistor, LED, output to ground;
+an output that bears less than the light's current switches a module that does. An LED's two wires
+go from its pocket through the grooves of arm and crown, down the post, and out of the foot's
+channel, to a connector; resistors (IEC 60063) and switch modules are beside the controller.
 
 GRBL 1.1 has two outputs only, for spindle and coolant. grblHAL, FluidNC and LinuxCNC number digital
 outputs from 0 and switch them by M64 P (on) and M65 P (off), at once when the line is read; a dwell
@@ -35,7 +37,8 @@ from tbcad.records.prototype_drive import Phase
 from tbcad.records.tables import WiringRow
 
 LAMP_OUTPUT, LAMP = 0, "lamp"
-MAX_OUTPUTS = 8  # digital outputs that FluidNC has, and boards with grblHAL have at most
+MAX_OUTPUTS = 8  # digital outputs of the boards in boards.csv, at most
+COOLANT_OUTPUTS = 1  # that releases the camera
 DARK, LIT = "dark", "lit"
 # Two digits of each decade.
 E24 = (
@@ -44,7 +47,8 @@ E24 = (
 )
 DERATING = 2.0  # rated power over dissipated power, so that a resistor stays below 100 degrees C
 ROUNDING = 1e-9
-DIGITAL = "digital"
+DIGITAL, BY_MODULE = "digital", "by a switch module"
+LETS_FALL = "The supply's switch, its plug and its fuse let it fall."
 OWN_WIRES = ("motor", "supply")  # lines whose way is told instead of an output
 MAX_FILL = 0.5  # of a bore's section by wires as squares, so that they can be pulled through
 LEAD_MM = 1000.0  # from the foot of the stage to the controller
@@ -62,7 +66,7 @@ LAMP_PATH = "from lamp to lamp, all in parallel, then to the controller"
 ON_CABLE: Row = {"wire": CABLE, "length_mm": CABLE_MM, "connector": BOARD}
 RELEASE: Row = ON_CABLE | {
     **{"signal": "release", "part": "RELAY", "output": "coolant", "on": "M8", "off": "M9"},
-    "path": "relay, camera's release",
+    "path": "the relay's coil to plus of the supply; its contact: the camera's release",
 }
 HOME: Row = ON_CABLE | {
     **{"signal": "home", "part": "SWITCH-ROLLER"},
@@ -73,6 +77,10 @@ MOTOR: Row = {
     "connector": BOARD,
     "pins": "A+ A- B+ B-",
     "path": "the motor's own wires; a few ohm are between the two of a coil",
+}
+BRAKE: Row = ON_CABLE | {
+    **{"signal": "brake", "output": "supply", "supply_v": 24.0, "pins": "+ -"},
+    "path": "to plus and minus behind the fuse; without voltage its spring holds the motor",
 }
 FUSE, SUPPLY_V = "FUSE-2A", 24.0
 SUPPLY: Row = ON_CABLE | {
@@ -200,6 +208,7 @@ class Wiring(Mounted):
     # one for each line of the controller: lights by output, release, switch, motor, supply
     rows: tuple[Row, ...]
     circuit: LedCircuit | None  # of the LEDs, None without any
+    board: PurchasedPart  # of the controller
 
     @property
     def parts(self) -> Parts:
@@ -211,38 +220,60 @@ def wiring_layout(site: Site, before: FrameLayout) -> Wiring:
     """The electronics; SpecError as of `led_circuit`."""
     spec, motion, leds = site.spec.prototype, site.spec.prototype.motion, site.stage.leds
     circuit, outputs = led_circuit(spec, site.stage, site.parts), lights(len(leds), motion)
+    board = controller_board(outputs, site.parts)
     # Of each LED's cable down to its groove, inward, down the post, to the controller.
     length = norm(leds[:, :2]) + leds[:, 2] - spec.frame.floor_mm
     length = CUT_MM * np.ceil((length + CHANNEL_MM + LEAD_MM + crown.GROOVE_MM) / CUT_MM)
-    rows = [_row(_lamp_cells(before.find(LampLayout), spec.stage.led_supply_v), outputs)]
-    listed = {SWITCH_MODULE: len(outputs)}
+    rows = [_lamp_cells(before.find(LampLayout), spec.stage.led_supply_v)]
+    listed = {board.name: 1}
     if circuit:
-        leds_cells = (_led_cells(site, circuit, i, one) for i, one in enumerate(length.tolist()))
-        rows += [_row(cells, outputs) for cells in leds_cells]
+        rows += [_led_cells(site, circuit, i, one) for i, one in enumerate(length.tolist())]
         metres = math.ceil(WIRES * float(length.sum()) / METRE_MM)
         listed |= {circuit.resistor.part.name: len(leds), circuit.connector.name: 1}
         listed |= {circuit.wire.name: metres}
-    rows += [RELEASE] if motion.trigger == "coolant" else []
+    modules = sum(_needs_module(cells, board) for cells in rows) if outputs else 0
+    rows = [_row(cells, outputs, board) for cells in rows]
+    if motion.trigger == "coolant":
+        rows, listed = [*rows, RELEASE], listed | {"RELAY": 1}
     motor: Row = {"part": site.drive.motor.name, "output": f"driver {motion.axis}"}
     # A rotary stage's current is its maker's.
     rated: Row = {"current_ma": site.drive.of_motor("rated_a") * MA_PER_A or None}
-    rows += [HOME | {"output": f"limit {motion.axis}"}, MOTOR | motor | rated, SUPPLY]
+    brake = [BRAKE | {"part": site.drive.brake.name}] if site.drive.brake else []
+    rows += [HOME | {"output": f"limit {motion.axis}"}, MOTOR | motor | rated, *brake, SUPPLY]
     on_cable = sum(float(row["length_mm"] or 0) for row in rows if row.get("wire") == CABLE)
     empty: Row = dict.fromkeys(WiringRow.columns())
     return Wiring(
-        listed=listed | {CABLE: math.ceil(on_cable / METRE_MM)},
+        listed=listed | {SWITCH_MODULE: modules, CABLE: math.ceil(on_cable / METRE_MM)},
         rows=tuple({**empty, **row, "line": number} for number, row in enumerate(rows, 1)),
         circuit=circuit,
+        board=board,
     )
 
 
-def _row(cells: Row, outputs: dict[str, int]) -> Row:
+def controller_board(outputs: dict[str, int], parts: Parts) -> PurchasedPart:
+    """The smallest board with these outputs and one for the coolant function.
+
+    SpecError when none has so many.
+    """
+    needed = float(len(outputs) + COOLANT_OUTPUTS)
+    hint = "use fewer LEDs in prototype.stage.leds_mm"
+    return choose_part(parts, "boards", "prototype.motion", hint, "outputs", outputs=needed)
+
+
+def _needs_module(cells: Row, board: PurchasedPart) -> bool:
+    """Whether a light's current is more than the board's outputs bear, or is not known."""
+    return not 0 < float(cells.get("current_ma") or 0) <= board["output_ma"]
+
+
+def _row(cells: Row, outputs: dict[str, int], board: PurchasedPart) -> Row:
     """A light's row, with what switches it; without an output it is switched by hand."""
     output = outputs.get(str(cells["signal"]))
     if output is None:
         return {"connector": BOARD, "output": "by hand", **cells}
     on, off = f"M64 P{output}", f"M65 P{output}"
-    return {"connector": BOARD, "output": f"digital {output}", "on": on, "off": off, **cells}
+    by = f" {BY_MODULE}" if _needs_module(cells, board) else ""
+    named = f"{DIGITAL} {output}{by}"
+    return {"connector": BOARD, "output": named, "on": on, "off": off, **cells}
 
 
 def _lamp_cells(lamps: LampLayout | None, supply_v: float) -> Row:
@@ -293,7 +324,7 @@ def _wire(section: StageSpec, stage: StageLayout, current_ma: float, parts: Part
     return max(fitting, key=lambda wire: wire["outer_mm"])
 
 
-@planned("Wiring", loose=("electronics", "wires", "connectors", "resistors"))
+@planned("Wiring", loose=("boards", "electronics", "wires", "connectors", "resistors"))
 def wiring_step(machine: AssembledMachine) -> Words:
     """Lines of the controller, one each; without lamps, where light comes from instead."""
     rows = machine.wiring
@@ -301,6 +332,7 @@ def wiring_step(machine: AssembledMachine) -> Words:
     return told_words(
         __name__,
         "wiring",
+        board=machine.ref(machine.record.controller.board),
         lines=[{"line": _line(machine, row)} for row in rows],
         no_lamps=not machine.record.lamps,
         switched=switched,
@@ -314,9 +346,8 @@ def _line(machine: AssembledMachine, row: WiringRow) -> str:
         return f"{line} {part}{rated}; {row.path}."
     through = f" through {machine.ref(row.resistor)}" if row.resistor else ""
     pins = f", pins {row.pins.replace(' ', ' and ')} of {row.connector}" if row.pins else ""
-    switched = when(row.output.startswith(DIGITAL), " by a switch module")
     way = when(row.path and not row.resistor, f"; {row.path}")
-    return f"{line} {part}{through}{pins}, at {row.output}{switched}{way}."
+    return f"{line} {part}{through}{pins}, at {row.output}{way}."
 
 
 @planned("First photographs")
@@ -325,7 +356,9 @@ def first_step(machine: AssembledMachine) -> Words:
     phases = machine.record.controller.phases
     low, high = machine.record.swing_deg
     names = ", ".join(one.name.replace("_", " ") for one in phases)
-    return told_words(__name__, "first", count=len(phases), names=names, low=low, high=high)
+    off = "Without supply the brake holds it." if machine.record.power_off.brake else LETS_FALL
+    ends = {"low": low, "high": high, "without_supply": off}
+    return told_words(__name__, "first", count=len(phases), names=names, **ends)
 
 
 WIRING = Part((wiring_step,), wiring_layout)

@@ -291,7 +291,7 @@ def homing_step(machine: AssembledMachine) -> Words:
 @planned("Angle zero")
 def zero_step(machine: AssembledMachine) -> Words:
     """Settings, homing and the trim."""
-    firmware = machine.record.controller.firmware
+    firmware, off = machine.record.controller.firmware, machine.record.power_off
     homes, klipper = firmware != "grbl", firmware == "klipper"
     rated = next((row.current_ma for row in machine.wiring if row.signal == "motor"), None)
     return told_words(
@@ -305,8 +305,10 @@ def zero_step(machine: AssembledMachine) -> Words:
         grblhal=firmware == "grblhal",
         by_hand=not homes,
         unlock=when(firmware == "grblhal", "Unlock the controller by $X. "),
-        falls=machine.record.power_off.fall_energy_j,
-        off=machine.record.power_off,
+        falls=not off.brake and off.fall_energy_j,
+        brake=off.brake and machine.ref(off.brake),
+        off=off,
+        pinned=off.pin_force_n,
         home=machine.record.home,
     )
 

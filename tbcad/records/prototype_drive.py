@@ -18,9 +18,10 @@ class Phase(RecordSection):
 
 
 class Controller(RecordSection):
-    """The controller of motion and lights, and the photographs of a stop in order."""
+    """The controller of motion and lights, its board, and the photographs of a stop in order."""
 
     firmware: Firmware
+    board: str
     axis: Literal["X", "A"]
     phases: tuple[Phase, ...] = Field(min_length=1)
 
@@ -85,9 +86,13 @@ class PowerOff(RecordSection):
     """The base without power.
 
     Attributes:
-        fall_energy_j: energy with which it reaches an end of its travel, at most; without
-            friction, zero where the drive holds it or it swings below both ends.
-        fall_speed_deg_s: its speed there.
+        brake: part that holds it, none where the drive holds it or its fall is harmless.
+        brake_torque_nmm: torque of the brake on the base.
+        needed_torque_nmm: that a brake needs: gravity's within the travel, and a margin.
+        fall_energy_j: energy that it gets at most, without friction: until the brake engages, or
+            on the way to an end of its travel; zero where the drive holds it.
+        fall_energy_limit_j: permitted.
+        fall_speed_deg_s: its speed then.
         pin_force_n: force on the zero pin under the largest torque of gravity at any angle.
         pin_shear_mpa: shear in the pin.
         pin_shear_limit_mpa: permitted.
@@ -95,7 +100,11 @@ class PowerOff(RecordSection):
         pin_pressure_limit_mpa: permitted.
     """
 
+    brake: str | None
+    brake_torque_nmm: Finite
+    needed_torque_nmm: Finite
     fall_energy_j: Finite
+    fall_energy_limit_j: Finite
     fall_speed_deg_s: Finite
     pin_force_n: Finite
     pin_shear_mpa: Finite

@@ -15,13 +15,13 @@ from tbcad.prototype.purchased.parts import load_parts
 from tbcad.prototype.stage.layout import StageLayout, stage_layout
 
 # Balls are heavier than by default, so that some need stronger magnets.
-HEAVY = "prototype.largest_ball_mm=60"
+HEAVY = "prototype.largest_ball_mm=60", "prototype.grade=G40"
 # One of its balls is so near to the hub that a motor's pinion clears it by 2 mm only.
 SMALL = load_spec(
     None,
     [
         *("n=6", "prototype.k=4", "prototype.base.hub_boss_mm=35"),
-        *("prototype.frame.clearance_mm=1.5", HEAVY),
+        *("prototype.frame.clearance_mm=1.5", *HEAVY),
     ],
 )
 CAPTURE_RADIUS = 30.0
@@ -35,7 +35,7 @@ def spec() -> PrototypeSpec:
 @pytest.fixture(scope="session")
 def paper_prototype(paper_design: MirrorDesign) -> PrototypeLayout:
     """The prototype of the paper's design with heavy balls: 16, some of them caps."""
-    return prototype_layout(load_spec(None, [HEAVY]), paper_design)
+    return prototype_layout(load_spec(None, HEAVY), paper_design)
 
 
 @pytest.fixture(scope="session")
@@ -47,7 +47,7 @@ def small_prototype(small_design: MirrorDesign) -> PrototypeLayout:
 @pytest.fixture(scope="session")
 def layout(small_design: MirrorDesign) -> PrototypeLayout:
     """Six balls and caps, both, of the nearest sizes."""
-    options = ["n=6", "prototype.k=6", "prototype.snap=nearest", HEAVY]
+    options = ["n=6", "prototype.k=6", "prototype.snap=nearest", *HEAVY]
     return prototype_layout(load_spec(None, options), small_design)
 
 

@@ -51,7 +51,7 @@ class TestChoice:
     ) -> None:
         """The ball of one for all mirrors is too heavy for magnets at any angle of its pads."""
         fixed = MirrorDesign(
-            load_spec(None, ["n=6", f"prototype.k={k}", HEAVY]), small_design.arrays
+            load_spec(None, ["n=6", f"prototype.k={k}", *HEAVY]), small_design.arrays
         )
         every = list(arrangements(fixed))
         assert {one.spec.prototype.base.hold for one in every} == {hold}

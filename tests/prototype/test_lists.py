@@ -16,7 +16,7 @@ from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.electronics import e24_at_least, led_circuit, series_resistor, wiring_layout
 from tbcad.prototype.files.bom import ALWAYS, PrintedItem, bom_rows, totals
 from tbcad.prototype.part import FrameLayout, Site
-from tbcad.prototype.purchased.parts import Prices, load_parts, load_prices
+from tbcad.prototype.purchased.parts import Prices, load_parts, load_prices, of_kind
 from tbcad.prototype.stage.layout import StageLayout
 
 PARTS = load_parts()
@@ -68,7 +68,9 @@ def test_every_line_of_the_wiring(
     assert [row["signal"] for row in rows] == [*switched, *released, "home", "motor", "supply"]
     assert [row["line"] for row in rows] == [*range(1, len(rows) + 1)]
     for output, name in enumerate(switched):
-        commands = (f"digital {output}", f"M64 P{output}", f"M65 P{output}")
+        module = float(of[name]["current_ma"] or math.inf) > wiring.board["output_ma"]
+        by = " by a switch module" if module else ""
+        commands = (f"digital {output}{by}", f"M64 P{output}", f"M65 P{output}")
         told = tuple(of[name][key] for key in ("output", "on", "off"))
         assert told == (("by hand", None, None) if hand else commands)
     for k, name in enumerate(switched[1:]):
@@ -88,7 +90,13 @@ def test_every_line_of_the_wiring(
     assert (of["motor"]["output"], of["motor"]["part"]) == (f"driver {axis}", drive.motor.name)
     assert (of["supply"]["connector"], of["supply"]["supply_v"]) == ("FUSE-2A", 24.0)
     bought = wiring.listed
-    assert bought.get("MOSFET", 0) == (0 if hand else leds + 1)
+    by_module = ["module" in str(row["output"]) for row in rows]
+    assert bought.get("MOSFET", 0) == (0 if hand else sum(by_module))
+    assert bought.get("RELAY", 0) == len(released)
+    needed = 1 if hand else leds + 2  # lamp, and coolant that releases the camera
+    enough = [one for one in of_kind(PARTS, "boards") if one["outputs"] >= needed]
+    assert wiring.board == min(enough, key=lambda one: one["outputs"])
+    assert bought[wiring.board.name] == 1
     metres = Counter[str]()
     for row in rows:
         if row["wire"]:

@@ -119,3 +119,26 @@ def test_lists_that_are_not_there(tmp_path: Path) -> None:
     (package_copy(tmp_path) / "leds.csv").unlink()
     with pytest.raises(SpecError, match=r"leds\.csv: cannot be read"):
         load_parts(tmp_path)
+
+
+def test_wheels_have_one_thickness() -> None:
+    """Mass as a disc of aluminium (2.7 g/cm^3) of the pitch circle, less the bore, over the width.
+
+    The list tells the same width, and two rims of 1 mm are beside belt and play.
+    """
+    for wheel in of_kind(PARTS, "wheels"):
+        pitch = wheel["teeth"] * wheel["pitch_mm"] / math.pi
+        area = math.pi / 4 * (pitch**2 - wheel["bore_mm"] ** 2)
+        assert wheel.mass_g == pytest.approx(area * wheel["width_mm"] * 2.7e-3, rel=2e-3)
+        assert f"and {wheel['width_mm']:g} mm " in wheel.what
+        belt = 15 if "15 mm belt" in wheel.what else 6
+        assert wheel["width_mm"] >= belt + 3
+
+
+def test_spacers_are_on_the_inner_ring_of_their_bearing() -> None:
+    for spacer in of_kind(PARTS, "spacers"):
+        (bearing,) = of_kind(PARTS, "bearings", bore_mm=spacer["bore_mm"])
+        rim = bearing["bore_mm"] + 0.3 * (bearing["outer_mm"] - bearing["bore_mm"])
+        assert spacer["bore_mm"] + 3 <= spacer["outer_mm"] <= rim
+        ring = math.pi / 4 * (spacer["outer_mm"] ** 2 - spacer["bore_mm"] ** 2)
+        assert spacer.mass_g == pytest.approx(ring * spacer["width_mm"] * 2.7e-3, rel=2e-3)

@@ -307,9 +307,10 @@ class PrototypeSpec(Section):
     """Lists of prices: estimates, or CSV files (as seen from the folder tbcad runs in) with the
     columns part,each,per_kg,currency,date,source; the first list and line that fits a part
     counts."""
-    grade: GradeName = "G40"
-    """Grade of the balls by ISO 3290-1, not ABMA; only sizes sold in it are used. G40 is the
-    best that reaches 60 mm."""
+    grade: GradeName = "G20"
+    """Coarsest grade of the balls by ISO 3290-1, not ABMA; each is bought in the best of G10 or
+    coarser that its size is sold in, and larger sizes are not used. G20 reaches 38.1 mm and
+    leaves half the light unscattered; G28 (50 mm) and G40 (60 mm) leave 16 to 25 and 7 to 14 %."""
     largest_ball_mm: Annotated[float, OR_AUTO] = Field(AUTO, gt=0, le=1000)
     """Largest ball to buy, however large the lists go. Smaller: a lighter base, and more caps.
     auto: 0.8 of the semi-minor axis, at most 60."""

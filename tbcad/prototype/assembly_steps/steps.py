@@ -46,7 +46,9 @@ FITS = {
     "tnuts": "slide into the slot",
     "bearings": "press by hand on the outer ring; ream the seat if it takes a hammer",
     "shafts": "slide, without force and without play",
-    "collars": "push against the bearing, then its set screw hand tight",
+    "collars": "its set screw hand tight",
+    "spacers": "slide",
+    "brakes": "by its own screws, on the motor",
     "belts": "lay round the wheel; it is pulled tight with the motor",
 }
 SCREWED = ("screws", "setscrews")

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cache, cached_property
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 STEEL_DENSITY_G_CM3 = 7.81  # 100Cr6 (AISI 52100), the usual steel of bearing balls
 BUILT_IN = ("metric", "inch")
+FINEST = "G10"  # that shops stock in all sizes it is sold in; finer ones are made to order
 MAX_DIAMETER_MM = 1000.0
 MAX_MASS_G = 1e7
 
@@ -31,6 +32,18 @@ class StockBall:
     grades: frozenset[str]  # grades it is sold in
     mass_g: float  # mass of one ball
     source: str  # where these figures come from
+
+    def bought_grade(self, coarsest: str) -> str | None:
+        """The best grade from FINEST to the coarsest that it is sold in, or else a finer one.
+
+        None when it is sold in coarser ones only. ISO 3290-1 limits the roughness of a grade, and
+        with it the light that a ball scatters.
+        """
+        names = [*load_grades()]
+        last = names.index(coarsest)
+        first = min(names.index(FINEST), last)
+        wanted = (*names[first : last + 1], *reversed(names[:first]))
+        return next((grade for grade in wanted if grade in self.grades), None)
 
 
 COLUMNS = tuple(field.name for field in fields(StockBall))
@@ -60,9 +73,14 @@ class Catalogue:
         return np.array([ball.mass_g for ball in self.balls])
 
     def available(self, grade: str, max_diameter: float) -> "Catalogue":
-        """The sizes sold in a grade up to a diameter (mm); SpecError when there are none."""
+        """The sizes sold in a grade, or a better one, up to a diameter (mm).
+
+        SpecError when there are none.
+        """
         balls = tuple(
-            ball for ball in self.balls if grade in ball.grades and ball.diameter_mm <= max_diameter
+            ball
+            for ball in self.balls
+            if ball.bought_grade(grade) and ball.diameter_mm <= max_diameter
         )
         if not balls:
             raise SpecError(
@@ -87,6 +105,7 @@ class Grade:
 GRADE_COLUMNS = tuple(field.name for field in fields(Grade))
 
 
+@cache
 def load_grades() -> dict[str, Grade]:
     """All grades by name, the best first."""
     grades = {}

@@ -13,7 +13,7 @@ from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.core.optics.ball_light import ball_poses, pixel_counts, used_outlines
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.prototype import MOST_BALLS
-from tbcad.prototype.balls.catalogue import Catalogue, Grade, load_catalogue, load_grades
+from tbcad.prototype.balls.catalogue import Catalogue, load_catalogue
 from tbcad.prototype.balls.placement import (
     Placement,
     PlacementProblem,
@@ -141,7 +141,6 @@ class PrototypeLayout:
 
     spec: Spec  # of the design, with the number of balls
     array: MirrorArray  # camera a and its mirrors
-    grade: Grade  # deviations that the balls' grade allows
     groups: MirrorGroups  # mirrors that share a ball
     balls: Balls  # in the half-plane of azimuth zero
     fit: BallFit  # how well they replace the mirrors
@@ -176,6 +175,10 @@ class PrototypeLayout:
     def body_centres(self, angle: float = 0.0) -> Floats:
         """Centres of the spheres in the seats, mm, (k, 3); those of caps differ from centres."""
         return self.on_base(self.balls.body_centre, angle)
+
+    def bought_grade(self, place: int) -> str:
+        """The grade that a ball is bought in, by its place in the catalogue."""
+        return self.balls.catalogue.balls[place].bought_grade(self.spec.prototype.grade) or ""
 
     @property
     def mass_g(self) -> float:
@@ -238,7 +241,6 @@ def prototype_layout(
     return PrototypeLayout(
         spec=spec,
         array=array,
-        grade=load_grades()[spec.prototype.grade],
         groups=groups,
         balls=balls,
         fit=fit,

@@ -2,8 +2,7 @@
 
 Gravity is along -z of the shell's frame. The base turns about the axis w, which is inclined: the
 torque is zero with the centre of gravity straight above or below the axis, and largest with it
-beside the axis. The base has no counterweight, and a stepper without current holds next to nothing:
-without power it falls to where its centre of gravity is lowest, or strikes an end of its travel.
+beside the axis. The base has no counterweight; what holds it without power is in `power_off`.
 
 Homing turns the base downward until its tab presses the switch, then up again by the pull-off. The
 controller then knows the angle, and keeps the base between soft limits. Base angles are positive
@@ -20,8 +19,6 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.balls.selection import Balls
-from tbcad.prototype.base.hub import PIN_MM, PIN_OUT_MM, ZERO_DISC_MM
-from tbcad.records.prototype_drive import PowerOff
 from tbcad.types import Floats
 
 GRAVITY = 9.80665  # m/s^2, standard
@@ -150,10 +147,6 @@ PULL_OFF_DEG = 2.0
 OVERTRAVEL_DEG = 2.0  # below the switch, before the base stops
 ANGLE_STEP_DEG = 0.1  # that the switch's angle is rounded up to
 ABOVE_DEG = 1.0  # of the upper soft limit above the highest angle
-# Permitted of a printed hole round a pin, as below the heads of screws; of a rod of hardened steel
-# in shear: 0.4 of a proof stress of 580 MPa (8.8), which such a rod exceeds.
-PRESSURE_LIMIT_MPA, SHEAR_LIMIT_MPA = 20.0, 230.0
-MJ_PER_J, KG_M2 = 1e3, 1e-9  # KG_M2: of a gram millimetre squared
 
 
 @dataclass(frozen=True)
@@ -218,27 +211,7 @@ def home_angles(prototype: PrototypeLayout, motion: MotionSpec) -> HomeAngles:
     return HomeAngles(switch, switch + PULL_OFF_DEG, highest + ABOVE_DEG - switch + PULL_OFF_DEG)
 
 
-def power_off(balance: BaseBalance, low: float, high: float, *, holds_itself: bool) -> PowerOff:
-    """What a base does without power between the ends of its travel, radians."""
-    energy = 0.0 if holds_itself else _fall(balance, low, high) / MJ_PER_J
-    inertia = balance.inertia * KG_M2
-    speed = math.degrees(math.sqrt(2 * energy / inertia)) if inertia else 0.0
-    force = balance.torque_amplitude / PIN_OUT_MM
-    return PowerOff(
-        fall_energy_j=energy,
-        fall_speed_deg_s=speed,
-        pin_force_n=force,
-        pin_shear_mpa=force / (math.pi / 4 * PIN_MM**2),
-        pin_shear_limit_mpa=SHEAR_LIMIT_MPA,
-        pin_pressure_mpa=force / (PIN_MM * ZERO_DISC_MM),
-        pin_pressure_limit_mpa=PRESSURE_LIMIT_MPA,
-    )
-
-
-def _fall(balance: BaseBalance, low: float, high: float) -> float:
-    """Largest energy of gravity on the way to an end of the travel, N mm."""
-    ends: list[float] = balance.energy(np.array([low, high])).tolist()
-    top = balance.angle_of_top
-    top += 2 * math.pi * math.ceil((low - top) / (2 * math.pi))
-    highest = balance.torque_amplitude if top <= high else max(ends)
-    return highest - min(ends)
+def travel_ends(prototype: PrototypeLayout, motion: MotionSpec) -> tuple[float, float]:
+    """Base angles of both ends of the travel, radians; SpecError as of `home_angles`."""
+    angles = home_angles(prototype, motion)
+    return math.radians(angles.switch), math.radians(angles.switch + angles.travel)

@@ -42,11 +42,12 @@ class Drive:
     belt: PurchasedPart | None  # between the two
     coupling: PurchasedPart | None  # on the motor's shaft; None unless direct
     efficiency: float  # of the gear
+    brake: PurchasedPart | None = None  # on the rear of the motor's shaft
 
     @property
     def parts(self) -> tuple[PurchasedPart, ...]:
         """All parts, one of each."""
-        parts = (self.motor, self.pinion, self.wheel, self.belt, self.coupling)
+        parts = (self.motor, self.pinion, self.wheel, self.belt, self.coupling, self.brake)
         return tuple(part for part in parts if part)
 
     @property
@@ -60,6 +61,11 @@ class Drive:
     def holds_nmm(self) -> float:
         """Torque on the base that the motor's holding torque makes, N mm."""
         return self.motor["holding_nmm"] * self.ratio * self.efficiency
+
+    @property
+    def motor_length_mm(self) -> float:
+        """Length of the motor with its brake behind the plate, mm."""
+        return self.motor["length_mm"] + (self.brake["length_mm"] if self.brake else 0.0)
 
     def of_motor(self, size: str) -> float:
         """A size in motors.csv, as rated_a of a phase; zero of a stage, whose motor is its own."""

@@ -28,7 +28,9 @@ COLUMNS = (
 )
 WHOLE = ("item", "quantity", "print_volume_mm3")
 NUMBERS = (*WHOLE, "mass_g", "total_mass_g", "filament_g", "print_hours", *PRICE_COLUMNS[:2])
-ALWAYS = {"FUSE-2A": 1, "GLUE-EPOXY": 1, "GRBL-BOARD": 1, "RELAY": 1, "SUPPLY-24V": 1}
+ALWAYS = {"DRIVER-TMC5160": 1, "FUSE-2A": 1, "GLUE-EPOXY": 1, "SUPPLY-24V": 1}
+# Magnetic and hardened, so that magnets hold it and it polishes; AISI 52100. 316 is not magnetic.
+BALL_STEEL = "100Cr6"
 PRINT_MATERIAL, CAP_MATERIAL = "PETG", "resin"
 GRAM_DECIMALS, CENTS = 2, 2
 ESTIMATE_DIGITS = 2  # of what a model says of a print, and of masses below 0.1 g
@@ -160,11 +162,11 @@ def _printed(item: PrintedItem, density: float, prices: Prices) -> Row:
 
 def ball_rows(prototype: PrototypeLayout, prices: Prices) -> Iterator[Row]:
     """Purchased balls by rising diameter."""
-    balls, grade = prototype.balls, prototype.grade.grade
+    balls = prototype.balls
     for k, count in sorted(Counter(balls.stock[~balls.cap].tolist()).items()):
         ball = balls.catalogue.balls[k]
-        what = f"steel ball {ball.size} {ball.standard} {grade}"
-        yield _bought(f"ball {ball.size}", what, count, "steel", ball.mass_g, prices)
+        what = f"steel ball {ball.size} {ball.standard} {prototype.bought_grade(k)}"
+        yield _bought(f"ball {ball.size}", what, count, BALL_STEEL, ball.mass_g, prices)
 
 
 def _estimate(value: float) -> float:

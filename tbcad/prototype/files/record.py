@@ -10,17 +10,17 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.arrangement import PrototypeModel
 from tbcad.prototype.base.caps import cap_limits, holding
-from tbcad.prototype.drive.balance import BaseBalance, power_off, stop_sequence
+from tbcad.prototype.drive.balance import BaseBalance, stop_sequence, travel_ends
 from tbcad.prototype.drive.drive import (
     HOLD_MARGIN,
     MAX_RISE_K,
     MAX_WIND_UP_DEG,
-    SELF_LOCKING,
     Drive,
     base_torques,
     drive_loads,
 )
-from tbcad.prototype.electronics import phases
+from tbcad.prototype.drive.power_off import power_off
+from tbcad.prototype.electronics import Wiring, phases
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import totals
 from tbcad.prototype.frame.camera_gauge import CameraGauge, marks_seen
@@ -57,7 +57,6 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
     layout, spec, frame = built.layout, built.spec.prototype, built.frame
     homing, stock, leds = frame.of(HomingLayout), frame.of(Stock), len(built.stage.leds)
     angles = homing.angles
-    low, high = np.radians([angles.switch, angles.switch + angles.travel]).tolist()
     axis, zero, third = (layout.array.ellipsoid.frame() + 0.0).tolist()
     return Prototype(
         camera="a",
@@ -77,7 +76,10 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         ),
         calibration=_calibration(built),
         controller=Controller(
-            firmware=spec.motion.controller, axis=spec.motion.axis, phases=phases(leds, spec.motion)
+            firmware=spec.motion.controller,
+            board=frame.of(Wiring).board.name,
+            axis=spec.motion.axis,
+            phases=phases(leds, spec.motion),
         ),
         caps=cap_limits(built.spec, built.base, layout),
         camera_place=_camera_place(built),
@@ -111,9 +113,7 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         ),
         assembly=records.AssemblyFiles(step=STEP, glb=GLB),
         drive=drive_record(built.balance, built.drive, spec.motion, layout.stops.range),
-        power_off=power_off(
-            built.balance, low, high, holds_itself=built.drive.efficiency < SELF_LOCKING
-        ),
+        power_off=power_off(built.drive, built.balance, travel_ends(layout, spec.motion)),
     )
 
 

@@ -47,8 +47,9 @@ def _names(layout: PrototypeLayout, j: int) -> list[Cell]:
     diameter, size = 2 * float(balls.body_radius[j]), balls.size[j]
     if balls.cap[j]:
         return [j + 1, "cap", size, diameter, None, None, None]
-    standard = balls.catalogue.balls[balls.stock[j]].standard
-    return [j + 1, "ball", size, diameter, layout.grade.grade, standard, float(balls.mass_g[j])]
+    place = int(balls.stock[j])
+    grade, standard = layout.bought_grade(place), balls.catalogue.balls[place].standard
+    return [j + 1, "ball", size, diameter, grade, standard, float(balls.mass_g[j])]
 
 
 def _pose(layout: PrototypeLayout) -> Floats:

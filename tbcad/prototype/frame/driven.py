@@ -38,6 +38,7 @@ COUPLING_MM = 14.0  # length of a flange coupling with its gap to the motor; no 
 COUPLING_COLLAR_MM = 10.0  # diameter of its collar; see tbcad.prototype.base.hub
 COUPLING_GAP_MM = 2.0  # between coupling and motor
 PULLEY_RIM_MM = 1.5
+AXIAL_PLAY_MM, PLAY_STEP_MM = 0.1, 0.1  # of the collar, by feeler gauges
 SHAFT_END_MM = 2.0  # of the collar's bore beyond the shaft
 # A stage of the 60 mm class; assumed: its height, its top's, and the gap below the top.
 STAGE_HEIGHT_MM, STAGE_TOP_MM, STAGE_GAP_MM = 40.0, 12.0, 0.5
@@ -55,13 +56,15 @@ class ShaftParts:
     bearing: PurchasedPart
     shaft: PurchasedPart
     collar: PurchasedPart
+    spacer: PurchasedPart
     rear: float
     tube: float
 
     @property
     def listed(self) -> dict[str, int]:
         """Pieces by name."""
-        return {self.bearing.name: 2, self.shaft.name: 1, self.collar.name: 1}
+        others = (self.shaft, self.collar, self.spacer)
+        return {self.bearing.name: 2} | {one.name: 1 for one in others}
 
 
 def purchased_components(
@@ -71,7 +74,7 @@ def purchased_components(
     base, drive = site.base, site.drive
     if drive.motor.kind == "stages":
         return _rotary_stage(base, drive.motor, plate)
-    components, face = [_motor(base, drive, plate)], base.hub.mount
+    components, face = [*_motor(base, drive, plate)], base.hub.mount
     for name, part, out in (("wheel", drive.wheel, 0.0), ("pinion", drive.pinion, drive.centre_mm)):
         if part:
             # The holes that are drilled into the wheel for the screws into the hub.
@@ -117,8 +120,14 @@ def _coupling(base: BaseLayout, part: PurchasedPart) -> Component:
 
 
 def _on_shaft(base: BaseLayout, plate: HeadPlate, shaft_parts: ShaftParts) -> list[Component]:
-    """Shaft, bearings and the collar that bears what the base weighs along the axis."""
+    """Shaft and bearings; spacer and collar, on either side of them, keep the base along its axis.
+
+    The spacer is between the wheel and the inner ring of the front bearing.
+    """
     bearing, shaft, collar = shaft_parts.bearing, shaft_parts.shaft, shaft_parts.collar
+    spacer = shaft_parts.spacer
+    apart = (plate.front + spacer["width_mm"], plate.front)
+    sleeve = _ring(base, "spacer", spacer, apart, (spacer["outer_mm"], spacer["bore_mm"]))
     front, rear, width = base.hub.socket, shaft_parts.rear, bearing["width_mm"]
     end = front - shaft["length_mm"]
     body = base.cylinder(front, end, shaft["diameter_mm"] / 2)
@@ -131,6 +140,7 @@ def _on_shaft(base: BaseLayout, plate: HeadPlate, shaft_parts: ShaftParts) -> li
     return [
         Component("shaft", shaft.what, (body,), part=shaft.name, rotates=True),
         *rings,
+        replace(sleeve, rotates=True),
         Component("collar", collar.what, (ring,), (bore,), part=collar.name, rotates=True),
     ]
 
@@ -154,8 +164,8 @@ def _rotary_stage(
     )
 
 
-def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:
-    """A motor behind the plate with its pilot and shaft."""
+def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Iterator[Component]:
+    """A motor behind the plate with its pilot and shaft, and the brake behind it."""
     motor, out, back = drive.motor, drive.centre_mm, plate.back
     half, pilot = motor["frame_mm"] / 2, (back - OVERLAP_MM, back + motor["pilot_height_mm"])
     added = (
@@ -163,7 +173,12 @@ def _motor(base: BaseLayout, drive: Drive, plate: HeadPlate) -> Component:
         base.cylinder(*pilot, motor["pilot_mm"] / 2, out),
         base.cylinder(back, back + motor["shaft_length_mm"], motor["shaft_mm"] / 2, out),
     )
-    return Component("motor", motor.what, added, part=motor.name)
+    yield Component("motor", motor.what, added, part=motor.name)
+    if brake := drive.brake:
+        half, end = brake["frame_mm"] / 2, back - motor["length_mm"]
+        low = end - brake["length_mm"], out - half, -half
+        body = box(low, (end, out + half, half), base.frame)
+        yield Component("brake", brake.what, (body,), part=brake.name)
 
 
 def motor_screw_places(drive: Drive) -> list[tuple[float, float]]:
@@ -217,25 +232,36 @@ def hub_step(machine: AssembledMachine) -> Words:
     )
 
 
-@planned("Base on its shaft", "shaft", "collar", loose=("belts",), near=NEAR_SHAFT)
+@planned("Base on its shaft", "shaft", "spacer", "collar", loose=("belts",), near=NEAR_SHAFT)
 def shaft_step(machine: AssembledMachine) -> Words:
     """The base on its shaft."""
     shaft, wheel = machine.body_ref("shaft"), machine.has("wheel")
-    return told_words(__name__, "shaft", shaft=shaft, socket_mm=SOCKET_MM, wheel=wheel)
+    return told_words(
+        __name__,
+        "shaft",
+        shaft=shaft,
+        spacer=machine.body_ref("spacer"),
+        socket_mm=SOCKET_MM,
+        wheel=wheel,
+        play=AXIAL_PLAY_MM,
+        most=AXIAL_PLAY_MM + PLAY_STEP_MM,
+    )
 
 
-@planned("Motor", "motor", "pinion", near=("wheel",))
+@planned("Motor", "motor", "brake", "pinion", near=("wheel",))
 def motor_step(machine: AssembledMachine) -> Words:
     """The motor, with belt, or straight on the shaft."""
+    brake = machine.has("brake") and machine.body_ref("brake")
     if not machine.has("pinion"):
-        return told_words(__name__, "motor", coupling=machine.has("coupling"))
-    pinion, motor = (machine.listed(machine.bodies[body]) for body in ("pinion", "motor"))
-    front = PLATE_MM + GAP_MM + (pinion["width_mm"] if pinion else 0.0)
+        return told_words(__name__, "motor", coupling=machine.has("coupling"), brake=brake)
+    wheel, motor = (machine.listed(machine.bodies[body]) for body in ("wheel", "motor"))
+    front = PLATE_MM + GAP_MM + (wheel["width_mm"] if wheel else 0.0)
     shaft = motor["shaft_length_mm"] if motor else 0.0
     return told_words(
         __name__,
         "belt",
-        parts=pinion and motor,
+        parts=wheel and motor,
+        brake=brake,
         pinion=machine.body_ref("pinion"),
         front=front,  # so that the pinion's teeth are in line with the wheel's
         shaft_mm=shaft,
@@ -264,7 +290,7 @@ def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: PartsList) -> Sheet
     angle = float(np.degrees(np.arctan2(places[0][1], places[0][0])))
     on_holes = f"{len(holes)} x Ø<> on Ø{circle:g}"
     text = (
-        f"{part['teeth']:g} teeth, pitch {part['pitch_mm']:g}, width of the belt's rim as bought.",
+        f"{part['teeth']:g} teeth, pitch {part['pitch_mm']:g}, {part['width_mm']:g} over the rims.",
         f"{len(holes)} x Ø{SCREW_MM:g} through on a circle of Ø{circle:g} ± 0.1,",
         f"the first at {angle:.0f}°, the others {360 / len(holes):g}° apart.",
         "Drill from the flat side that lies against the",

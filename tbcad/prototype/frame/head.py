@@ -177,10 +177,11 @@ def _shaft_parts(site: Site, plate: HeadPlate) -> ShaftParts:
     bearing = choose_part(parts, "bearings", key, hint, "width_mm", bore_mm=bore)
     collar = choose_part(parts, "collars", key, hint, "width_mm", bore_mm=bore)
     in_front = base.hub.socket - plate.front
+    spacer = choose_part(parts, "spacers", key, hint, "outer_mm", bore_mm=bore, width_mm=GAP_MM)
     length = in_front + MIN_TUBE_MM + collar["width_mm"] + COLLAR_GAP_MM
     shaft = choose_part(parts, "shafts", key, hint, diameter_mm=bore, length_mm=length)
     rear = base.hub.socket - shaft["length_mm"] + collar["width_mm"] + COLLAR_GAP_MM
-    return ShaftParts(bearing, shaft, collar, rear, bearing["outer_mm"] / 2 + TUBE_WALL_MM)
+    return ShaftParts(bearing, shaft, collar, spacer, rear, bearing["outer_mm"] / 2 + TUBE_WALL_MM)
 
 
 def _flange(site: Site, plate: HeadPlate, at: tuple[float, float, float]) -> list[Primitive]:
@@ -250,7 +251,7 @@ def _motor_holes(site: Site, plate: HeadPlate) -> list[Primitive]:
     holes += [slot(place, base.frame[1], travel, screw, depth) for place in places]
     if not drive.belt:
         size = motor["frame_mm"] / 2 + WINDOW_PLAY_MM
-        low = plate.back - motor["length_mm"] - WINDOW_BEYOND_MM, -size, -size
+        low = plate.back - drive.motor_length_mm - WINDOW_BEYOND_MM, -size, -size
         holes.append(box(low, (plate.back, size, size), base.frame))
     return holes
 

@@ -19,8 +19,8 @@ COMMON_COLUMNS = ("part", "what", "material", "mass_g")
 KINDS = (
     *("motors", "stages", "wheels", "belts", "couplings", "shafts", "bearings", "screws"),
     *("setscrews", "inserts", "dowels", "magnets", "leds", "strips", "sheets", "resistors"),
-    *("wires", "connectors", "electronics", "extrusions", "tnuts", "nuts", "washers"),
-    *("collars", "plates"),
+    *("wires", "connectors", "boards", "electronics", "extrusions", "tnuts", "nuts", "washers"),
+    *("collars", "spacers", "brakes", "plates"),
 )
 """Lists of parts, in the order in which they are listed. Their own columns are sizes above zero.
 

@@ -41,6 +41,7 @@ def belt_design() -> Record:
         bought=[
             *(bought("plate", "PLATE-400x150x8"), bought("shaft", "SHAFT-8x100")),
             *(bought("wheel", "GT2-60"), bought("pinion", "GT2-20")),
+            bought("spacer", "SPACER-8x12x5"),
             *(bought("motor", "NEMA17-40"), bought("camera", None)),
         ],
         fasteners=[
@@ -62,7 +63,7 @@ def belt_design() -> Record:
     )
 
 
-LOOSE = {"GT2-240-6": 1, "GLUE-EPOXY": 1, "GRBL-BOARD": 1, "CABLE-2x0.25": 3, "ball 10 mm": 1}
+LOOSE = {"GT2-240-6": 1, "GLUE-EPOXY": 1, "OCTOPUS-PRO-1.1": 1, "CABLE-2x0.25": 3, "ball 10 mm": 1}
 
 
 def write(folder: Path, design: Record, more: dict[str, int]) -> Path:
@@ -149,7 +150,7 @@ def text_with(texts: tuple[str, ...], words: str) -> int:
 
 def direct(design: Record) -> None:
     """A motor with a coupling, without shaft and belt."""
-    gone = ("shaft", "wheel", "pinion")
+    gone = ("shaft", "spacer", "wheel", "pinion")
     design["bought"] = [one for one in design["bought"] if one["name"] not in gone]
     design["bought"].append(bought("coupling", "FLANGE-5"))
     design["fasteners"][2]["through"][0] = "coupling"

@@ -7,6 +7,7 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.balls.catalogue import (
     COLUMNS,
     Catalogue,
+    StockBall,
     load_catalogue,
     load_grades,
     steel_mass_g,
@@ -90,3 +91,20 @@ class TestOwn:
                 load_catalogue([name])
         with pytest.raises(SpecError, match="names no catalogue"):
             load_catalogue([])
+
+
+@pytest.mark.parametrize(
+    ("coarsest", "grades", "bought"),
+    [
+        ("G20", "G3 G5 G10 G16 G20", "G10"),
+        ("G20", "G20 G28", "G20"),
+        ("G20", "G28 G40", None),
+        ("G5", "G3 G5 G10", "G5"),
+        ("G40", "G3", "G3"),
+    ],
+)
+def test_a_ball_is_bought_in_the_best_grade_from_g10(
+    coarsest: str, grades: str, bought: str | None
+) -> None:
+    ball = StockBall("10 mm", 10.0, "ISO 3290-1", frozenset(grades.split()), 4.09, "mine")
+    assert ball.bought_grade(coarsest) == bought

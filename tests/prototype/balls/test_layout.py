@@ -28,7 +28,7 @@ from tbcad.prototype.balls.selection import (
 from tbcad.prototype.balls.stops import plan_stops, stop_requests
 from tests.prototype.conftest import HEAVY
 
-SPEC = load_spec(None, [HEAVY])
+SPEC = load_spec(None, HEAVY)
 LIMITS = SPEC.prototype
 DEGREE = np.radians(1)
 
@@ -201,7 +201,7 @@ class TestRefused:
                 *("prototype.k=16", "max_swing_deg=150"),
             ),
             ("camera_diameter_mm smaller", "camera_diameter_mm=500", "camera_length_mm=1000"),
-            ("no ball of grade G40 up to 0.9 mm", "largest_ball_mm=0.9"),
+            ("no ball of grade G20 up to 0.9 mm", "largest_ball_mm=0.9"),
         )
         for message, *options in cases:
             with pytest.raises(SpecError, match=message):

@@ -44,7 +44,7 @@ def test_a_whole_base(base: BaseLayout) -> None:
     some, seats, w = fasteners(base), base.seats, base.frame[0]
     # Four of the drive, two of the set screws; the zero disc's key.
     assert {name: n for name, n in counted(some).items() if not name.startswith("MAGNET")} == {
-        **{"INSERT-M3": 6, "SET-M3x16": 2, "DOWEL-3x10": 1, "M3x16": 4}
+        **{"INSERT-M3": 6, "SET-M3x16": 2, "DOWEL-3x10": 1, "M3x20": 4}
     }
     assert len({one.name for one in some}) == len(some)
     assert all(one.rotates for one in some)
@@ -77,7 +77,7 @@ def test_other_hubs_and_parts_in_no_list(small_prototype: PrototypeLayout) -> No
     clamp = counted(fasteners(base(lock="clamp")))
     assert clamp["INSERT-M3"] == 5
     screws = {name: count for name, count in clamp.items() if name.startswith("M3x")}
-    assert screws == {"M3x16": 4, "M3x30": 1}  # of the drive, and across the clamp
+    assert screws == {"M3x20": 4, "M3x30": 1}  # of the drive, and across the clamp
     screws = of_kind(fasteners(base(drive="nema17-direct")), "screws")
     assert {one.through for one in screws} == {("coupling", "zero_disc", "carrier")}
     stage = fasteners(base(drive="stage-60", hold="glue"))

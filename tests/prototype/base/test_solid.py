@@ -48,6 +48,7 @@ MESH_MM = 0.05
 @pytest.fixture(scope="module")
 def prototype(small_design: MirrorDesign) -> PrototypeLayout:
     options = ["n=6", "prototype.k=4", "prototype.snap=nearest", "prototype.largest_ball_mm=50"]
+    options += ["prototype.grade=G40"]
     return prototype_layout(load_spec(None, options), small_design)
 
 

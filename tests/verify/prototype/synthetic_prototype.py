@@ -52,7 +52,7 @@ NOT_MADE = {
     *("camera mount", "camera gauge", "cap tilt", "plays", "shroud", "radius rule"),
     *("lamps", "light before and after", "light of the lamps", "light from above"),
     *("light in the stage's shadow", "hold ratio", "drive", "motor bearing", "power off"),
-    *("fall energy", "object room", "leds seen", "part files"),
+    *("fall energy", "axial chain", "object room", "leds seen", "part files"),
 }
 
 
@@ -267,6 +267,7 @@ def ball_rows(balls: list[Ball]) -> list[dict[str, Any]]:
     for k, ball in enumerate(balls):
         row: dict[str, Any] = {"number": k + 1, "kind": "cap" if k == CAP else "ball"}
         row |= {"diameter_mm": 2 * float(ball.body), "mass_g": None if k == CAP else 4.0}
+        row["grade"] = "" if k == CAP else "G10"
         row |= {"radius_mm": float(ball.radius), "body_radius_mm": float(ball.body)}
         polar, azimuth = angles(unit(ball.p)).tolist()
         row |= {"polar_deg": polar, "azimuth_deg": azimuth}
@@ -341,6 +342,7 @@ def prototype(spec: SyntheticPrototype) -> tuple[dict[str, Any], dict[str, bytes
         ],
         "parts": entries,
         "leds": [{"name": "led_1", "position_mm": [1.0, 1.0, -5.0]}],
+        "controller": {"board": "OCTOPUS-PRO-1.1"},
         "home": {
             "switch_deg": switch_angle(stops),
             "homed_deg": switch_angle(stops) + 2,

@@ -40,7 +40,7 @@ Shape = tuple[Floats, Ints]  # corners (V, 3) in mm, facets (F, 3)
 
 FILE = RECORD
 CHECKS = {"inventory": "faults", "leds as designed": "faults", "assembly step": "mm"}
-TURNING = frozenset({"wheel", "shaft", "collar", "coupling", "rotary_stage_top"})
+TURNING = frozenset({"wheel", "shaft", "spacer", "collar", "coupling", "rotary_stage_top"})
 VIEWS = frozenset({"capture_sphere", "camera_view"})
 COUPON, SIZE_DIGITS = "coupon_", 6  # names of coupons; decimals of sizes that are the same, mm
 COUPONS = ("coupons", f"{COUPON}*.step", "seats")

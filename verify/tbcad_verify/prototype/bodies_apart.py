@@ -109,11 +109,19 @@ def meant_fit(
 
 
 def belt(context: PrototypeContext, wheels: list[Floats]) -> Any:
-    """The room of a belt round two wheels, whose corners (V, 3) are given."""
+    """The room of a belt round two wheels, whose corners (V, 3) are given.
+
+    It is as wide as the first of them: the pinion's hub is beside it.
+    """
     import manifold3d
 
+    placed = [corners @ context.frame.T for corners in wheels]
+    ends = placed[0][:, 0].min(), placed[0][:, 0].max()
+    for corners in placed:
+        corners[:, 0] = corners[:, 0].clip(*ends)
+
     def loop(inset: float) -> Any:
-        points = [_shrunk(corners @ context.frame.T, inset) for corners in wheels]
+        points = [_shrunk(corners, inset) for corners in placed]
         return manifold3d.Manifold.hull_points(np.concatenate(points) @ context.frame)
 
     return loop(0.0) - loop(BELT_MM)

@@ -19,7 +19,6 @@ from tbcad_verify.report.checks import (
     CheckName,
     Unknown,
     at_most,
-    informative,
     no_faults,
     require,
 )
@@ -48,6 +47,11 @@ AXIS_MM = 1e-6
 # plastic, and shear of hardened steel.
 PIN_MM, PIN_OUT_MM, DISC_MM = 4.0, 44.0, 5.0
 PRESSURE_MPA, SHEAR_MPA = 20.0, 230.0
+# Brakes: torque at the motor, N mm, and time until it is there, s; what it needs over gravity.
+BRAKES = {"BRAKE-17-0.4": (400.0, 0.04)}
+BRAKE_MARGIN = 1.5
+# Energy that a clamped finger takes up: 140 N on 75 N/mm (ISO/TS 15066:2016, annex A, hand).
+FALL_J = 140.0**2 / (2 * 75.0) * 1e-3
 FALL_STEPS = 100_001  # of the travel: the energy is flat where it is largest
 FILE = RECORD
 CHECKS = {"drive": "faults", "motor bearing": "N", "power off": "faults", "fall energy": "J"}
@@ -102,12 +106,12 @@ def checks(
         context.export.spec.prototype.motion.acceleration_deg_s2
     )
     radial, limit = _shaft_load(gear, peak), _shaft_limit(name)
-    energy, speed = _fall(context, balance)
+    energy, speed = _fall(context, balance, BRAKES.get(bought.get("brake") or ""), gear.ratio)
     return [
         no_faults(drive, _faults(context, motor, gear, worst, peak)),
         at_most(bearing, radial, limit, f"the belt pulls with {radial:.0f} N"),
         no_faults(off, _pin_faults(context, balance)),
-        informative(fall, energy, f"to an end of the travel, at {speed:.0f} deg/s"),
+        at_most(fall, energy, FALL_J, f"at {speed:.0f} deg/s, {_held_by(bought)}"),
     ]
 
 
@@ -220,12 +224,28 @@ def _pin_faults(context: PrototypeContext, balance: Balance) -> Iterator[str]:
             yield f"the zero pin's {name} is {load:.0f} MPa, it bears {limit:.0f}"
 
 
-def _fall(context: PrototypeContext, balance: Balance) -> tuple[float, float]:
-    """Energy, J, and speed, deg/s, with which the base reaches an end when the motor lets go."""
+def _held_by(bought: Mapping[str, str | None]) -> str:
+    """What holds the base without power, in words."""
+    return f"with {bought['brake']}" if bought.get("brake") else "without a brake"
+
+
+def _fall(
+    context: PrototypeContext,
+    balance: Balance,
+    brake: tuple[float, float] | None = None,
+    ratio: float = 1.0,
+) -> tuple[float, float]:
+    """Energy, J, and speed, deg/s, that the base gets when the motor lets go.
+
+    Until its brake engages under the largest torque; without one that holds it, to an end.
+    """
     home = context.prototype.home
     if context.export.spec.prototype.base.drive == WORM:
         return 0.0, 0.0
     angle = np.radians(np.linspace(home.switch, home.switch + home.travel, FALL_STEPS))
     height = context.base_rotation(angle).apply(balance.centre)[:, 2]  # mm
     energy = balance.mass * GRAVITY * 1e-6 * (height.max() - min(height[0], height[-1]))
-    return float(energy), float(np.degrees(np.sqrt(2 * energy / (balance.inertia * 1e-9))))
+    torque, inertia = np.abs(balance.torque(context, angle)).max(), balance.inertia * 1e-9
+    if brake and brake[0] * ratio >= BRAKE_MARGIN * torque:
+        energy = (torque * 1e-3 * brake[1]) ** 2 / (2 * inertia)
+    return float(energy), float(np.degrees(np.sqrt(2 * energy / inertia)))

@@ -51,6 +51,8 @@ Angles = Annotated[Floats, numbers(-360, 360)]
 Masses = Annotated[Floats, numbers_or_empty(0, LARGEST)]
 Names = Annotated[NDArray[np.str_], column(Name, np.str_)]
 Kinds = Annotated[NDArray[np.str_], column(Literal["ball", "cap"], np.str_)]
+GRADE_NAMES = *(f"G{one}" for one in (3, 5, 10, 16, 20, 24, 28, 40, 60, 100, 200)), ""
+Grades = Annotated[NDArray[np.str_], column(Literal[GRADE_NAMES], np.str_)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 
 
@@ -62,6 +64,7 @@ class Balls(Columns):
     number: Counts
     kind: Kinds
     diameter_mm: Lengths
+    grade: Grades  # by ISO 3290-1; empty for caps
     mass_g: Masses
     radius_mm: Lengths
     body_radius_mm: Lengths
@@ -316,6 +319,12 @@ class Assembly(Strict):
     glb: FileOrNone = ""
 
 
+class Controller(Strict):
+    """What drives motion and lights."""
+
+    board: str = Field(max_length=WIDEST)  # name in the parts list
+
+
 class Prototype(Strict):
     """The whole record."""
 
@@ -327,6 +336,7 @@ class Prototype(Strict):
     leds: list[Led] = Field(max_length=MOST)  # of the stage
     camera_place: CameraPlace | None = None  # how the camera is put in its place; None without one
     home: Home  # angles of homing
+    controller: Controller  # of motion and lights
     # purchased parts other than balls and fasteners
     bought: list[PurchasedBody] = Field(max_length=MOST)
     fasteners: list[PlacedFastener] = Field(max_length=MOST)  # in their places
