@@ -265,7 +265,13 @@ FAILING: Broken = {
         "a motor that turns": (record("bought/motor/turns", True), "motor turns"),
         "a panel too few": (record("shroud/panels/-1"), "shroud_right is not"),
     },
-    ("fastener holes", RECORD): {"a screw not recorded": (record(SCREW), "without a fastener")},
+    ("fastener holes", RECORD): {
+        "a screw not recorded": (record(SCREW), "without a fastener"),
+        "a bracket without its screw": (
+            record("fasteners/M5x8"),
+            "upright_left_bracket_1: 2 of 5.5 mm without a fastener",
+        ),
+    },
     ("fasteners", RECORD): {
         "a screw beside its hole": (record(f"{SCREW}/position_mm/0", plus(0.1)), "elsewhere"),
         "a screw through another": (
@@ -443,6 +449,10 @@ FAILING: Broken = {
         "the camera through its fence": (drawn_away("camera", 1.0, 0, -6.0), "camera and camera_f"),
         "the camera too high": (drawn_away("camera", 5.0), "camera and camera_riser"),
         "the lens in its camera": (drawn_away("camera_lens", 1.0, 0, -6.0), "camera and camera_l"),
+        "a bracket in its upright": (
+            drawn_away("upright_left_bracket_1", -1.0),
+            "upright_left and upright_left_bracket_1",
+        ),
         "a lamp in its stand": (drawn_away("lamp_1", 2.0), "lamp_1 and lamp_stand_1"),
         "two inserts in one place": (
             drawn_away("INSERT_M3_1", -14.0, 0.0, -14.0),

@@ -41,6 +41,7 @@ SOLID = frozenset(
 # Smallest grip in nominal diameters: in an insert or aluminium; in a steel nut (thin, ISO 4035).
 GRIP, GRIP_NUT = 1.0, 0.5
 INSERT = "INSERT-"
+BRACKETS = "BRACKET-"  # bought, and drawn with their holes
 NUTS = (INSERT, "TNUT-", "NUT-")  # what a screw is turned into
 MOTOR_DEPTH_MM = 4.5  # of the thread in a NEMA 17 motor's face
 
@@ -234,6 +235,7 @@ def _hole_faults(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> 
     if any(part.name.startswith("carrier_") for part in prototype.parts):
         printed |= {base.dowel_mm + base.dowel_press_mm, base.dowel_mm + base.dowel_slip_mm}
     some = [part.name for part in prototype.parts if part.role in ("base", "stage", "frame")]
+    some += [one.name for one in prototype.bought if str(one.part).startswith(BRACKETS)]
     diameters = dict.fromkeys(some, printed) | {"plate": {*IN_PLATE_MM}}
     for name in diameters.keys() & solids.keys():  # another check says what is missing
         through = [one for one in prototype.fasteners if name in one.through]
