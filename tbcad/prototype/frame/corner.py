@@ -5,6 +5,7 @@ as the list has it: no fillets, and slots that go straight through.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from tbcad.prototype.frame.shared import (
     TNUT,
     WASHER,
 )
-from tbcad.prototype.part import Bracket, Site
+from tbcad.prototype.part import Bracket
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.types import Floats
 
@@ -26,15 +27,30 @@ CORNER = "BRACKET-2028"
 SLOT_DEPTH_MM = 6.1  # of an extrusion of 20 mm; no list gives it
 
 
-def standing_bar(
-    name: str, part: PurchasedPart, middle: Floats, ends: tuple[float, float], axes: Floats
-) -> Component:
-    """An extrusion about an upright line (2,) of the frame's axes, between two heights, mm."""
-    half, (low, high) = EXTRUSION_MM / 2, ends
-    body = box((*(middle - half), low), (*(middle + half), high), axes)
-    slots = _slots(part["slot_mm"], middle, ends, axes)
-    what = f"{part.what}, cut to {high - low:.1f} mm"
-    return Component(name, what, (body,), slots, part=part.name)
+@dataclass(frozen=True)
+class StandingBar:
+    """An extrusion that stands on the plate."""
+
+    name: str  # of its body
+    part: PurchasedPart  # that it is cut from
+    middle: Floats  # of its section, along the frame's level axes, mm, (2,)
+    ends: tuple[float, float]  # heights of both ends, mm
+    axes: Floats  # of the frame, as rows, (3, 3)
+    parts: Parts  # lists of purchased parts
+
+    @property
+    def component(self) -> Component:
+        """Its body."""
+        half, (low, high) = EXTRUSION_MM / 2, self.ends
+        body = box((*(self.middle - half), low), (*(self.middle + half), high), self.axes)
+        slots = _slots(self.part["slot_mm"], self.middle, self.ends, self.axes)
+        what = f"{self.part.what}, cut to {high - low:.1f} mm"
+        return Component(self.name, what, (body,), slots, part=self.part.name)
+
+    def brackets(self, sides: Sequence[tuple[int, int]]) -> tuple[Bracket, ...]:
+        """Corner brackets on some of its sides, unit vectors along the frame's level axes."""
+        outward = [np.array([*side, 0.0]) for side in sides]
+        return tuple(_corner_bracket(self, k, out) for k, out in enumerate(outward, 1))
 
 
 def _slots(
@@ -49,37 +65,21 @@ def _slots(
     return tuple(box(low + one, high + other, axes) for one, other in sides)
 
 
-def corner_brackets(
-    site: Site, name: str, bar: str, middle: Floats, sides: Sequence[tuple[int, int]]
-) -> tuple[Bracket, ...]:
-    """Brackets named from 1 on some sides of a bar on the plate, whose middle (2,) is given, mm.
-
-    Sides are unit vectors along the frame's level axes.
-    """
-    return tuple(
-        _corner_bracket(site, f"{name}_{number}", bar, middle, np.array([*side, 0.0]))
-        for number, side in enumerate(sides, 1)
-    )
-
-
-def _corner_bracket(site: Site, name: str, bar: str, middle: Floats, out: Floats) -> Bracket:
-    parts, part, up = site.parts, site.parts[CORNER], np.array([0.0, 0.0, 1.0])
+def _corner_bracket(bar: StandingBar, number: int, out: Floats) -> Bracket:
+    parts, part, up = bar.parts, bar.parts[CORNER], np.array([0.0, 0.0, 1.0])
     own = np.stack([out, np.cross(up, out), up])  # out from the bar, across, up
-    start = np.array([*middle, site.spec.prototype.frame.floor_mm]) + EXTRUSION_MM / 2 * out
-    axes = own @ site.axes
-    at = start @ site.axes
+    start = np.array([*bar.middle, bar.ends[0]]) + EXTRUSION_MM / 2 * out
+    at, axes, name = start @ bar.axes, own @ bar.axes, f"{bar.name}_bracket_{number}"
     leg, half, base = part["leg_mm"], part["width_mm"] / 2, part["base_mm"]
-    component = Component(
-        name, part.what, (_body(part, axes, at),), _removed(part, axes, at), part=part.name
-    )
+    body, removed = _body(part, axes, at), _removed(part, axes, at)
     ends = np.array([[a, b, 0.0] for a in (0.0, leg) for b in (-half, half)]) @ own + start
     hole = start + part["hole_mm"] * out
     on_bar = at + np.array([base, 0.0, part["hole_mm"]]) @ axes
     return Bracket(
-        component,
+        Component(name, part.what, (body,), removed, part=part.name),
         hole[None, :2],
         ends[:, :2],
-        _on_bar((name, bar), on_bar, -axes[0], base, parts),
+        _on_bar((name, bar.name), on_bar, -axes[0], base, parts),
         thickness=base,
     )
 

@@ -32,10 +32,11 @@ from tbcad.prototype.assembly_steps.machine import (
 )
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import PartsList
-from tbcad.prototype.frame.corner import CORNER, corner_brackets, standing_bar
+from tbcad.prototype.frame.corner import CORNER, StandingBar
 from tbcad.prototype.frame.shared import (
     ENGAGEMENT_MM,
     EXTRUSION_MM,
+    UPRIGHTS,
     WASHER,
     BearingHead,
     drilled_holes,
@@ -49,7 +50,6 @@ from tbcad.types import Floats
 TAPPED_M5_MM = 4.2
 PLATE_BORDER_MM = 10.0  # of the plate beyond the brackets' feet
 HOLES = "plate_holes.csv"
-UPRIGHTS = "upright_left", "upright_right"
 PLATE, UPRIGHT = "drawing_plate", "drawing_upright"
 TABLE_MM = (10.0, 18.0, 18.0, 14.0, 42.0)  # widths of the columns of the hole table
 TABLE_HEAD = ("hole", "x", "y", "thread", "holds")
@@ -81,7 +81,7 @@ def stock_layout(site: Site, before: FrameLayout) -> Stock:
     upright, length, bars = _uprights(site, before.of(BearingHead))
     plate, body, corner = _plate(site, before.brackets)
     return Stock(
-        purchased=(body, *bars),
+        purchased=(body, *(bar.component for bar in bars)),
         fasteners=tuple(_plate_fasteners(site, before.brackets)),
         listed={plate.name: 1, upright.name: len(UPRIGHTS)},
         plate=plate,
@@ -96,32 +96,25 @@ def stock_layout(site: Site, before: FrameLayout) -> Stock:
 
 def feet_layout(site: Site, before: FrameLayout) -> Mounted:
     """Corner brackets on the fronts and the backs of both uprights."""
-    middles = _middles(site, before.of(BearingHead).face)
-    brackets = [
-        bracket
-        for name, middle in zip(UPRIGHTS, middles, strict=True)
-        for bracket in corner_brackets(site, f"{name}_bracket", name, middle, ((1, 0), (-1, 0)))
-    ]
+    _, _, bars = _uprights(site, before.of(BearingHead))
+    brackets = [one for bar in bars for one in bar.brackets(((1, 0), (-1, 0)))]
     return Mounted(brackets=tuple(brackets), listed={CORNER: len(brackets)})
 
 
-def _middles(site: Site, face: float) -> Floats:
-    """Middles of both uprights, whose front is at a level coordinate, mm, (2, 2)."""
-    across = site.spec.prototype.frame.uprights_mm / 2
-    return np.array([[face - EXTRUSION_MM / 2, side * across] for side in (1, -1)])
-
-
-def _uprights(site: Site, head: BearingHead) -> tuple[PurchasedPart, float, list[Component]]:
-    """Part and length of the uprights, and their bodies."""
+def _uprights(site: Site, head: BearingHead) -> tuple[PurchasedPart, float, list[StandingBar]]:
+    """Part and length of the uprights, and both of them."""
     spec = site.spec.prototype.frame
-    length = head.top - spec.floor_mm
+    length, x = head.top - spec.floor_mm, head.face - EXTRUSION_MM / 2
     hint = "make prototype.frame.floor_mm greater, or add a longer one"
     part = choose_part(site.parts, "extrusions", "prototype.frame.floor_mm", hint, length_mm=length)
-    bars = [
-        standing_bar(name, part, middle, (spec.floor_mm, head.top), site.axes)
-        for name, middle in zip(UPRIGHTS, _middles(site, head.face), strict=True)
-    ]
-    return part, length, bars
+    ends, across = (spec.floor_mm, head.top), spec.uprights_mm / 2
+    middles = (np.array([x, side * across]) for side in (1, -1))
+    bars = zip(UPRIGHTS, middles, strict=True)
+    return (
+        part,
+        length,
+        [StandingBar(name, part, middle, ends, site.axes, site.parts) for name, middle in bars],
+    )
 
 
 def _plate(site: Site, brackets: Sequence[Bracket]) -> tuple[PurchasedPart, Component, Floats]:
@@ -187,7 +180,8 @@ def shop_step(machine: AssembledMachine) -> Words:
 def frame_step(machine: AssembledMachine) -> Words:
     """Brackets and uprights; T-nuts in the front slot of each and in its back one."""
     axis = np.array(machine.record.frame.axis)
-    nuts = [one.along @ axis for one in machine.fasteners if machine.kind(one.part) == "tnuts"]
+    some = [one for one in machine.fasteners if machine.kind(one.part) == "tnuts"]
+    nuts = [one.along @ axis for one in some if one.through[-1] in UPRIGHTS]
     # Screws go in from the front against the axis, which leans from the uprights to the camera.
     front = sum(along < 0 for along in nuts)
     back = len(nuts) - front

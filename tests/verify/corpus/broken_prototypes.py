@@ -453,7 +453,7 @@ FAILING: Broken = {
             drawn_away("upright_left_bracket_1", -1.0),
             "upright_left and upright_left_bracket_1",
         ),
-        "a lamp in its stand": (drawn_away("lamp_1", 2.0), "lamp_1 and lamp_stand_1"),
+        "a lamp in its post": (drawn_away("lamp_1", 2.0), "lamp_1 and lamp_post_left"),
         "two inserts in one place": (
             drawn_away("INSERT_M3_1", -14.0, 0.0, -14.0),
             "and INSERT_M3_2",

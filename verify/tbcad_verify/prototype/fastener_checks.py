@@ -36,7 +36,10 @@ IN_PLATE_MM = (4.2,)
 IN_PRINTED_MM = (2.0, 2.8, 3.4, 4.5, 5.5, 6.6)
 # Drawn without holes: bodies of catalogue parts.
 SOLID = frozenset(
-    {*("motor", "rotary_stage", "rotary_stage_top", "camera"), *("upright_left", "upright_right")}
+    {
+        *("motor", "rotary_stage", "rotary_stage_top", "camera"),
+        *("upright_left", "upright_right", "lamp_post_left", "lamp_post_right"),
+    }
 )
 # Smallest grip in nominal diameters: in an insert or aluminium; in a steel nut (thin, ISO 4035).
 GRIP, GRIP_NUT = 1.0, 0.5
