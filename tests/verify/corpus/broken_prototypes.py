@@ -447,7 +447,7 @@ FAILING: Broken = {
         "an upright in the belt": (drawn_away("pinion", -160.0, 80.0), "belt and upright_left"),
         "the camera in its bracket": (drawn_away("camera", 40.0), "camera and camera_bracket"),
         "the camera through its fence": (drawn_away("camera", 1.0, 0, -6.0), "camera and camera_f"),
-        "the camera too high": (drawn_away("camera", 5.0), "camera and camera_riser"),
+        "the camera too high": (drawn_away("camera", 5.0), "camera and camera_fence"),
         "the lens in its camera": (drawn_away("camera_lens", 1.0, 0, -6.0), "camera and camera_l"),
         "a bracket in its upright": (
             drawn_away("upright_left_bracket_1", -1.0),
