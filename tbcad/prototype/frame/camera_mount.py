@@ -487,8 +487,9 @@ def _check_camera(place: _Place, bodies: tuple[Component, ...]) -> None:
 def camera_step(machine: AssembledMachine) -> Words:
     """The camera's mount."""
     made_for = machine.has("camera_lens")
-    tripod = next(one for one in machine.fasteners if one.through[-1] == "camera")
-    step = " on the fence's step" if "camera_fence" in tripod.through else ""
+    on_step = {"camera_fence", "camera"}
+    stands = any(on_step <= {*one.through} for one in machine.fasteners)
+    step = when(stands, " on the fence's step")
     does = [
         "Press the inserts into the camera plate from behind.",
         "Bracket on the base plate with washers, in the middle of its slots.",
