@@ -300,7 +300,6 @@ FAILING: Broken = {
             ("base/clearance_mm", 0.6, "the cup of ball 1 is 0.500 mm from it"),
             ("base/cap_play_mm", 0.2, "a spigot has 0.100 mm of play"),
             ("frame/bearing_fit_mm", 0.0, "no hole for bearing_front"),
-            ("frame/post_play_mm", 0.4, "no hole for stage_post"),
         )
     },
     ("plays", "carrier.step"): {
