@@ -34,7 +34,6 @@ from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import PartsList
 from tbcad.prototype.frame.corner import CORNER, StandingBar
 from tbcad.prototype.frame.shared import (
-    ENGAGEMENT_MM,
     EXTRUSION_MM,
     UPRIGHTS,
     WASHER,
@@ -47,7 +46,7 @@ from tbcad.prototype.purchased.parts import PurchasedPart, choose_part, choose_s
 from tbcad.prototype.sheets import fitted, outer, title_block
 from tbcad.types import Floats
 
-TAPPED_M5_MM = 4.2
+M5_MM, TAPPED_M5_MM = 5.0, 4.2
 PLATE_BORDER_MM = 10.0  # of the plate beyond the brackets' feet
 HOLES = "plate_holes.csv"
 PLATE, UPRIGHT = "drawing_plate", "drawing_upright"
@@ -144,12 +143,12 @@ def _plate(site: Site, brackets: Sequence[Bracket]) -> tuple[PurchasedPart, Comp
 
 
 def _plate_fasteners(site: Site, brackets: Sequence[Bracket]) -> Iterator[Fastener]:
-    """Screws with washers through the brackets' feet into the base plate's threads."""
+    """Screws with washers through brackets into threads of the base plate, by their diameter."""
     spec, axes = site.spec.prototype.frame, site.axes
     washer, down = site.parts[WASHER], -axes[2]
     for bracket in brackets:
         thick = bracket.thickness or spec.flange_mm
-        screw = choose_screw(site.parts, 5.0, thick + 2 * ENGAGEMENT_MM)
+        screw = choose_screw(site.parts, M5_MM, washer["thickness_mm"] + thick + M5_MM)
         through = (bracket.component.name, "plate")
         for x, y in bracket.holes.tolist():
             place = np.array([x, y, spec.floor_mm + thick]) @ axes
