@@ -63,7 +63,13 @@ def prototype_document(**changes: Any) -> Record:
             **{"plate": "PLATE-400x150x8", "upright": "2020-350", "uprights_cut_to_mm": 310.0}
         },
         "totals": {
-            **{"mass_g": 1.0, "bought_price": {}, "without_price": 0},
+            **{
+                "mass_g": 1.0,
+                "bought_price": {},
+                "without_price": 0,
+                "work_price": {},
+                "parts_printed": 0,
+            },
             **{"filament_g": 1.0, "filament_price": {}, "print_hours": 1.0},
         },
         "assembly": {"step": "prototype.step", "glb": "prototype.glb"},

@@ -289,7 +289,8 @@ def _open_keys(spec: Spec) -> dict[str, object]:
     return {"k": spec.prototype.k} | {f"base.{key}": getattr(base, key) for key in OPEN_BASE_KEYS}
 
 
-MAY_BE_LIT = ("camera", "camera_lens")  # light goes into them
+# Light goes into the first two; the stage's own limits hold for its post.
+MAY_BE_LIT = ("camera", "camera_lens", "stage_post")
 REMEDY = "prototype.frame.uprights_mm or prototype.largest_ball_mm smaller"
 
 

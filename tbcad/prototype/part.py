@@ -51,20 +51,21 @@ def frame_axes(axis: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Bracket:
-    """A printed part that is screwed on the base plate."""
+    """A part that is screwed on the base plate, printed, or bought where its component says so."""
 
     component: Component  # the part itself
     # tapped holes that it needs in the base plate, (x, y) along the frame's axes, (h, 2)
     holes: Floats
     foot: Floats  # corners of its foot on the plate, the same, (f, 2)
     fasteners: tuple[Fastener, ...] = ()  # of it, but for those in the base plate
+    thickness: float | None = None  # of it at its holes, mm; None: prototype.frame.flange_mm
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mounted:
     """What a part adds to the frame, in the frame of the shell."""
 
-    brackets: tuple[Bracket, ...] = ()  # to print, on the base plate
+    brackets: tuple[Bracket, ...] = ()  # on the base plate
     printed: tuple[Component, ...] = ()  # other bodies to print
     tools: tuple[Component, ...] = ()  # to print, and not in the assembly
     purchased: tuple[Component, ...] = ()  # simple bodies of what is bought, for the assembly
@@ -106,7 +107,12 @@ class FrameLayout:
             [body for one in self.mounted if bool(one.brackets) is flag for body in one.printed]
             for flag in (True, False)
         )
-        return (*others, *(bracket.component for bracket in self.brackets), *carried)
+        return (*others, *self._standing(bought=False), *carried)
+
+    def _standing(self, *, bought: bool) -> tuple[Component, ...]:
+        """Brackets that are bought, or printed."""
+        some = (bracket.component for bracket in self.brackets)
+        return tuple(body for body in some if bool(body.part) is bought)
 
     @property
     def tools(self) -> tuple[Component, ...]:
@@ -117,7 +123,8 @@ class FrameLayout:
     def purchased(self) -> tuple[Component, ...]:
         """Simple bodies of purchased parts."""
         stock_first = (*self.mounted[-1:], *self.mounted[:-1])
-        return tuple(body for one in stock_first for body in one.purchased)
+        bodies = tuple(body for one in stock_first for body in one.purchased)
+        return (*bodies, *self._standing(bought=True))
 
     @property
     def fasteners(self) -> tuple[Fastener, ...]:

@@ -280,11 +280,15 @@ class ListTotals(RecordSection):
     Attributes:
         mass_g: of all parts, printed ones as solids.
         without_price: kinds of parts that are bought and have none.
+        work_price: of the finish of caps, and of tools.
+        parts_printed: parts of the machine that are printed, without tools.
     """
 
     mass_g: Finite
     bought_price: dict[str, Finite]
     without_price: int
+    work_price: dict[str, Finite]
+    parts_printed: int
     filament_g: Finite
     filament_price: dict[str, Finite]
     print_hours: Finite

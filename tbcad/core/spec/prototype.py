@@ -222,9 +222,6 @@ class StageSpec(Section):
     """Wall round an LED's pocket."""
     wire_mm: float = Field(2.4, ge=1, le=10)
     """Width of the wires' channels."""
-    wall_mm: float = Field(2.7, ge=1, le=20)
-    """Wall of the post, best a multiple of the slicer's lines (six of 0.45 mm, else they overfill
-    it); less in posts of less than 18 mm."""
 
 
 class LightSpec(Section):
@@ -280,8 +277,6 @@ class FrameSpec(Section):
     """Distance of the camera's tripod thread behind the pinhole; auto: by lens and body, or 50."""
     camera_travel_mm: float = Field(20.0, ge=0, le=200)
     """Length by which the camera can be moved along its axis, half to either side."""
-    post_play_mm: float = Field(0.2, ge=0, le=2)
-    """Play on the diameter of the post in its clamp."""
 
 
 class PrototypeSpec(Section):

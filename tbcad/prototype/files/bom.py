@@ -5,6 +5,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,9 @@ GRAM_DECIMALS, CENTS = 2, 2
 ESTIMATE_DIGITS = 2  # of what a model says of a print, and of masses below 0.1 g
 LIGHT_G = 0.1
 KINDS = BOUGHT, PRINTED = "bought", "printed"
+WORK = SERVICE, TOOL = "service", "tool"  # rows that are no parts of the machine
+WORK_LIST, CAP_FINISH = "work.csv", "CAP-FINISH"
+TOOL_MARK = "tool: "  # of what is printed to assemble the others
 MM3_PER_CM3 = 1000.0
 SHOWN = 6  # rows without --full
 WHAT, PART = 34, 17  # columns, of the 80 of a terminal
@@ -57,6 +61,7 @@ class PrintedItem:
     volume: float  # mm^3
     estimate: tuple[float, float]  # of its print: filament in mm^3, hours
     material: str = PRINT_MATERIAL  # of it
+    tool: bool = False  # whether it is no part of the machine
 
 
 def bom_rows(
@@ -91,6 +96,23 @@ def bom_rows(
     return [{"item": item, **row} for item, row in enumerate(rows, 1)]
 
 
+def work_rows(prototype: PrototypeLayout, first: int, prices: Prices) -> list[Row]:
+    """What else is to pay for, items numbered from a first: finish of caps, and tools.
+
+    The plate and the wheel are drilled with these.
+    """
+    file = files("tbcad.prototype.files") / WORK_LIST
+    counts = {CAP_FINISH: int(prototype.balls.cap.sum())}
+    rows: list[Row] = []
+    for _, cells in read_rows(file, WORK_LIST, ("part", "what", "from")):
+        part, quantity = cells["part"], counts.get(cells["part"], 1)
+        row = dict.fromkeys(COLUMNS) | {**cells, "quantity": quantity, "standard": ""}
+        priced = price_columns(quantity, prices.of(part, 0.0))
+        if quantity:
+            rows.append({**row, **priced, "item": first + len(rows), "material": ""})
+    return rows
+
+
 def cap_item(
     prototype: PrototypeLayout, j: int, volume: float, estimate: tuple[float, float]
 ) -> PrintedItem:
@@ -107,14 +129,22 @@ def totals(rows: Iterable[Row]) -> dict[str, Any]:
     """Sums of a list, for prototype.json; prices by currency, of parts that have one."""
     rows = list(rows)
     bought, printed = ([row for row in rows if row["from"] == kind] for kind in KINDS)
+    work = [row for row in rows if row["from"] in WORK]
     return {
         "mass_g": _sum(rows, "total_mass_g"),
         "bought_price": by_currency(bought),
         "without_price": sum(row["unit_price"] is None for row in bought),
+        "work_price": by_currency(work),
+        "parts_printed": sum(not is_tool(row) for row in printed),
         "filament_g": _sum(printed, "filament_g"),
         "filament_price": by_currency(printed),
         "print_hours": _sum(printed, "print_hours"),
     }
+
+
+def is_tool(row: Row) -> bool:
+    """Whether a row is of what the machine is assembled with."""
+    return row["from"] == TOOL or str(row["what"]).startswith(TOOL_MARK)
 
 
 def _row(part: str, what: str, quantity: int, material: str, mass: float) -> Row:
@@ -151,7 +181,7 @@ def _printed(item: PrintedItem, density: float, prices: Prices) -> Row:
     filament = filament_mm3 / MM3_PER_CM3 * density
     mass = item.volume / MM3_PER_CM3 * density
     return {
-        **_row(item.name, item.what, 1, item.material, mass),
+        **_row(item.name, TOOL_MARK * item.tool + item.what, 1, item.material, mass),
         "print_volume_mm3": round(item.volume),
         "filament_g": _estimate(filament),
         "print_hours": _estimate(hours),
@@ -197,12 +227,16 @@ class PartsList:
     @cached_property
     def items(self) -> dict[str, int]:
         """Number of each part."""
-        return {str(row["part"]): int(row["item"] or 0) for row in self.rows}
+        return {str(row["part"]): int(row["item"] or 0) for row in self._parts}
 
     @cached_property
     def quantities(self) -> dict[str, int]:
         """Quantity of each part."""
-        return {str(row["part"]): int(row["quantity"] or 0) for row in self.rows}
+        return {str(row["part"]): int(row["quantity"] or 0) for row in self._parts}
+
+    @property
+    def _parts(self) -> list[Row]:
+        return [row for row in self.rows if row["from"] in KINDS]
 
     def record(self) -> dict[str, Any]:
         """For other programs: the sums, then all rows by the columns of bom.csv."""
@@ -234,8 +268,9 @@ def _read_row(where: str, cells: Mapping[str, str]) -> Row:
         except ValueError:
             raise SpecError(f"{where}, column {column}: no number: build again") from None
         row[column] = int(number) if number is not None and column in WHOLE else number
-    if cells["from"] not in (BOUGHT, PRINTED):
-        raise SpecError(f"{where}, column from: allowed is bought or printed: build again")
+    if cells["from"] not in (*KINDS, *WORK):
+        allowed = ", ".join((*KINDS, *WORK))
+        raise SpecError(f"{where}, column from: allowed are {allowed}: build again")
     return row
 
 
@@ -254,12 +289,17 @@ def _sums(rows: Sequence[Row]) -> Iterator[str]:
     unknown = f", {without} of them without a price" if without else ""
     yield f"{len(bought)} kinds of parts to buy: {_money(sums['bought_price'])}{unknown}"
     kg, hours = sums["filament_g"] / KG_G, sums["print_hours"]
+    tools = sum(row["from"] == PRINTED for row in rows) - sums["parts_printed"]
+    also = f" and {tools} tools" if tools else ""
     yield (
-        f"{len(rows) - len(bought)} parts to print: {kg:.1f} kg of filament, "
+        f"{sums['parts_printed']} parts{also} to print: {kg:.1f} kg, "
         f"{_money(sums['filament_price'])}, {hours:.0f} h ({hours / DAY_H:.1f} days)"
     )
-    yield f"{sums['mass_g'] / KG_G:.1f} kg in all, printed parts as solids; prices are estimates"
-    yield "not in the list: camera, lens, computer, tools, paint"
+    if sums["work_price"]:
+        yield f"finish of caps, other tools: {_money(sums['work_price'])}"
+    yield f"in all {_money(by_currency(rows))}, as estimated and without shipping"
+    yield f"{sums['mass_g'] / KG_G:.1f} kg in all, printed parts as solids"
+    yield "not in the list: camera, lens, computer, drill, saw, soldering iron, paint"
 
 
 def _money(prices: Mapping[str, float]) -> str:

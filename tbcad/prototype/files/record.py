@@ -49,7 +49,7 @@ PAD_UM = 10.0  # largest error of a ball's centre, found from its pads
 # Fasteners that are bought black, so that the camera does not see them shine.
 BLACK_KINDS = frozenset({"screws", "setscrews", "washers", "nuts", "tnuts"})
 # Purchased bodies; the others, which the camera sees between the balls, are painted or taped.
-NOT_BLACKENED = ("bearing_*", "camera", "lamp_*")
+NOT_BLACKENED = ("bearing_*", "camera", "lamp_[0-9]")
 
 
 def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Sheet]) -> Prototype:
@@ -244,7 +244,7 @@ def _lamps(lamps: LampLayout | None) -> LampsRecord | None:
         level=lamps.level,
         places=tuple(
             LampPlace(name=body.name, position_mm=place, direction=direction)
-            for body, place, direction in zip(lamps.purchased, places, inward, strict=True)
+            for body, place, direction in zip(lamps.bodies, places, inward, strict=True)
         ),
         lumen_each=lamps.lumen,
         watt=lamps.watt,

@@ -127,10 +127,13 @@ def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: P
     printed = [
         bom.cap_item(layout, part.ball, part.solid.volume, estimate)
         if part.role == "cap"
-        else bom.PrintedItem(part.name, part.what, part.solid.volume, estimate)
+        else bom.PrintedItem(
+            part.name, part.what, part.solid.volume, estimate, tool=part.role == "tool"
+        )
         for part, estimate in zip(built.printed, estimates, strict=True)
     ]
-    return bom.bom_rows(layout, built.drive, built.purchased, printed, density, built.parts, prices)
+    rows = bom.bom_rows(layout, built.drive, built.purchased, printed, density, built.parts, prices)
+    return [*rows, *bom.work_rows(layout, len(rows) + 1, prices)]
 
 
 def _write_tables(built: PrototypeModel, folder: Path) -> None:

@@ -4,7 +4,8 @@ Six ways to move, each with screws of its own. The bracket's foot slides along t
 screws between bracket and camera plate set the distance, roll and pitch; their slots in the bracket
 let it slide across. On the camera plate the camera slides along its optical axis, and turns (yaw)
 about the tripod screw. The fence below the camera, with two slots of its own, holds both, and keeps
-the camera from turning on a screw that does not.
+the camera from turning on a screw that does not. Where the lens is wider than the camera's foot is
+high, the fence has a step that the camera stands on, and slides with it.
 
 Lengths are behind the pinhole along the optical axis, across, and out from the axis.
 """
@@ -97,7 +98,7 @@ class CameraMount(Mounted):
 
     travel: CameraTravel  # how far the camera moves to either side
     chosen: ChosenCamera | None  # camera that it is made for; None: a cylinder stands in for it
-    riser: float  # between camera and camera plate, mm
+    riser: float  # height of the fence's step, between camera and camera plate, mm
 
 
 @dataclass(frozen=True)
@@ -124,12 +125,12 @@ class _Place:
 
     @property
     def radius(self) -> float:
-        """Out to the camera plate; between this and the axis is a riser."""
+        """Out to the camera plate; between this and the axis is the fence's step."""
         return plate_face(self.axis, self.chosen.lens_radius) if self.chosen else self.axis
 
     @property
     def riser(self) -> float:
-        """Height of the riser; 0 without."""
+        """Height of the fence's step; 0 without."""
         return self.radius - self.axis
 
     @property
@@ -229,7 +230,7 @@ def camera_mount(site: Site, _: FrameLayout) -> CameraMount | None:
     play = float(np.degrees(np.arctan((M5_HOLE_MM - M5_MM) / spec.frame.flange_mm)))
     return CameraMount(
         brackets=(_bracket(place),),
-        printed=(_plate(place, parts), *_riser(place), _fence(place)),
+        printed=(_plate(place, parts), _fence(place)),
         purchased=_camera(place),
         fasteners=_fasteners(place, parts),
         travel=CameraTravel(
@@ -285,7 +286,8 @@ def _fasteners(place: _Place, parts: Parts) -> tuple[Fastener, ...]:
     ]
     screw, below = _tripod_screw(place, parts)
     at = place.point(place.tripod, 0.0, place.radius + below)
-    through = ("camera_plate", *(one.name for one in _riser(place)), "camera")
+    step = ("camera_fence",) if _has_step(place) else ()
+    through = ("camera_plate", *step, "camera")
     tripod = Fastener(screw, at, -place.own[2], through)
     return (*(one for some in screws for one in some), tripod)
 
@@ -360,31 +362,39 @@ def _plate(place: _Place, parts: Parts) -> Component:
     return Component("camera_plate", what, (body,), tuple(removed), (-out, out))
 
 
-def _riser(place: _Place) -> tuple[Component, ...]:
-    """The block between plate and camera that keeps the lens off the plate, where it needs one."""
-    if place.chosen is None or not place.riser:
-        return ()
+def _has_step(place: _Place) -> bool:
+    return place.chosen is not None and place.riser > 0
+
+
+def _step(place: _Place) -> tuple[Primitive, Primitive]:
+    """What keeps the lens off the plate, and the hole of the tripod screw in it."""
+    assert place.chosen is not None
     start, half = place.chosen.flange + RISER_END_MM, max(RISER_HALF_MM, place.chosen.half_width)
-    body = place.block((start, -half, place.axis), (place.back, half, place.radius))
+    end = place.back + OVERLAP_MM
+    body = place.block((start, -half, place.axis), (end, half, place.radius))
     ends = place.axis - THROUGH_MM, place.radius + THROUGH_MM
-    hole = place.hole(place.tripod, 0.0, ends, TRIPOD_HOLE_MM)
-    out, what = place.own[2], "riser between plate and camera"
-    return (Component("camera_riser", what, (body,), (hole,), (out, -out)),)
+    return body, place.hole(place.tripod, 0.0, ends, TRIPOD_HOLE_MM)
 
 
 def _fence(place: _Place) -> Component:
-    """The bar below the camera that its back lies against."""
+    """The bar below the camera that its back lies against, with its step where it needs one."""
     near, far = place.radius - place.fence_height, place.radius
     start = place.back
-    body = place.block((start, -FENCE_HALF_MM, near), (start + FENCE_MM, FENCE_HALF_MM, far))
-    removed = []
+    added: list[Primitive] = [
+        place.block((start, -FENCE_HALF_MM, near), (start + FENCE_MM, FENCE_HALF_MM, far))
+    ]
+    removed: list[Primitive] = []
     for across in (-FENCE_SCREW_MM, FENCE_SCREW_MM):
         at, head = (place.fence_screws, across), near + HEAD_DEPTH_MM
         removed.append(place.hole(*at, (near, far + THROUGH_MM), M5_HOLE_MM))
         removed.append(place.hole(*at, (near - THROUGH_MM, head), HEAD_HOLE_MM))
+    if _has_step(place):
+        body, hole = _step(place)
+        added.append(body)
+        removed.append(hole)
     what = "fence that keeps the camera from turning"
     out = place.own[2]
-    return Component("camera_fence", what, (body,), tuple(removed), (out, -out))
+    return Component("camera_fence", what, tuple(added), tuple(removed), (out, -out))
 
 
 def _bracket(place: _Place) -> Bracket:
@@ -472,12 +482,14 @@ def _check_camera(place: _Place, bodies: tuple[Component, ...]) -> None:
 
 @planned(
     "Bracket, plate and fence of the camera",
-    *("camera_bracket", "camera_plate", "camera_riser", "camera_fence", "camera", "camera_lens"),
+    *("camera_bracket", "camera_plate", "camera_fence", "camera", "camera_lens"),
 )
 def camera_step(machine: AssembledMachine) -> Words:
     """The camera's mount."""
     made_for = machine.has("camera_lens")
-    riser = " on the riser" if machine.has("camera_riser") else ""
+    on_step = {"camera_fence", "camera"}
+    stands = any(on_step <= {*one.through} for one in machine.fasteners)
+    step = when(stands, " on the fence's step")
     does = [
         "Press the inserts into the camera plate from behind.",
         "Bracket on the base plate with washers, in the middle of its slots.",
@@ -488,8 +500,8 @@ def camera_step(machine: AssembledMachine) -> Words:
         "Camera and lens are not in the list: camera.json has what they must do, and tbcad camera "
         "shows which on sale do it."
         + when(made_for, " The mount is made for the camera and the lens that the picture names."),
-        f"Fence on the plate. Then your camera{riser} on the plate by its tripod thread, its back "
-        "against the fence.",
+        f"Fence on the plate. Then your camera{step} by its tripod thread, through the plate, its "
+        "back against the fence.",
     ]
     checks = [
         f"The gap between plate and bracket is {GAP_MM:g} mm at all three screws, to 0.5 mm.",

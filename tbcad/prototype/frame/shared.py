@@ -18,6 +18,7 @@ TNUT, WASHER = "TNUT-M5-6", "WASHER-5"
 # Diameters of clearance holes by ISO 273, medium, by thread (1/4 inch: 6.35).
 CLEARANCE_HOLE_MM = {3.0: 3.4, 4.0: 4.5, 5.0: 5.5, 6.0: 6.6, 6.35: 6.6}
 EXTRUSION_MM = 20.0  # side of the uprights
+UPRIGHTS = "upright_left", "upright_right"  # at positive y, and at negative
 HALF_FLANGE_MM = 10.0  # of flanges and feet beyond the middles of the uprights
 THROUGH_MM = 1.0  # by which a removed body extends beyond the part
 OVERLAP_MM = 2.0  # by which added bodies overlap, so that no faces coincide
@@ -73,15 +74,20 @@ def drilled_holes(places: Sequence[Floats], depth: Floats, diameter: float) -> l
 
 
 def on_uprights(
-    name: str, places: Sequence[Floats], along: Floats, flange: float, parts: Parts
+    name: str,
+    places: Sequence[Floats],
+    along: Floats,
+    flange: float,
+    parts: Parts,
+    bars: tuple[str, str] = UPRIGHTS,
 ) -> tuple[Fastener, ...]:
-    """Screws through a body's flange (mm thick) into T-nuts of the uprights.
+    """Screws through a body's flange (mm thick) into T-nuts of two bars: the uprights, or others.
 
-    Places (3,) are on a face of the uprights, mm; the unit vector along points into them.
+    Places (3,) are on a face of the bars, mm; the unit vector along points into them.
     """
     screw, fasteners = choose_screw(parts, 5.0, flange + ENGAGEMENT_MM), list[Fastener]()
     for place in places:
-        upright = "upright_left" if place[1] > 0 else "upright_right"
-        fasteners.append(Fastener(screw, place - flange * along, along, (name, upright)))
-        fasteners.append(Fastener(parts[TNUT], place, along, (upright,)))
+        bar = bars[0] if place[1] > 0 else bars[1]
+        fasteners.append(Fastener(screw, place - flange * along, along, (name, bar)))
+        fasteners.append(Fastener(parts[TNUT], place, along, (bar,)))
     return tuple(fasteners)

@@ -1,4 +1,4 @@
-"""What all else is mounted to: base plate, uprights, and the uprights' feet."""
+"""What all else is mounted to: base plate, uprights, and the brackets that they stand in."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from tbcad.cad.drafting.sheet import (
 )
 from tbcad.cad.drafting.sheet import rectangle as outline
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
-from tbcad.core.geometry.primitives import Component, Primitive, box, rectangle
+from tbcad.core.geometry.primitives import Component, box
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.assembly_steps.machine import (
     AssembledMachine,
@@ -32,19 +32,13 @@ from tbcad.prototype.assembly_steps.machine import (
 )
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import PartsList
+from tbcad.prototype.frame.corner import CORNER, StandingBar
 from tbcad.prototype.frame.shared import (
-    CLEARANCE_HOLE_MM,
-    ENGAGEMENT_MM,
     EXTRUSION_MM,
-    HALF_FLANGE_MM,
-    OVERLAP_MM,
-    THROUGH_MM,
+    UPRIGHTS,
     WASHER,
     BearingHead,
     drilled_holes,
-    level_prism,
-    on_uprights,
-    webs,
 )
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
@@ -52,18 +46,9 @@ from tbcad.prototype.purchased.parts import PurchasedPart, choose_part, choose_s
 from tbcad.prototype.sheets import fitted, outer, title_block
 from tbcad.types import Floats
 
-M5_HOLE_MM = CLEARANCE_HOLE_MM[5.0]
-
-# Feet of the uprights.
-FOOT_HEIGHT_MM, FOOT_DEPTH_MM = 50.0, 48.0
-FOOT_WEB_MM = 15.0  # from the middle to the webs
-FOOT_SCREW_MM = 13.0  # from the foot's ends to its screws
-WEB_SETBACK_MM = 4.0  # of webs from the ends of their flanges
-TAPPED_M5_MM = 4.2
-SLOT_DEPTH_MM = 6.1  # of an extrusion of 20 mm; no list gives it
+M5_MM, TAPPED_M5_MM = 5.0, 4.2
 PLATE_BORDER_MM = 10.0  # of the plate beyond the brackets' feet
 HOLES = "plate_holes.csv"
-UPRIGHTS = 2
 PLATE, UPRIGHT = "drawing_plate", "drawing_upright"
 TABLE_MM = (10.0, 18.0, 18.0, 14.0, 42.0)  # widths of the columns of the hole table
 TABLE_HEAD = ("hole", "x", "y", "thread", "holds")
@@ -74,7 +59,7 @@ LAMP_NOTES = {
     2: ("Left end on the plate. Marked: both screws of a lamp's holder, in the front slot.",),
 }
 LEVEL_MM = 8.0  # from one dimension line to the next
-CUT_MM = 1.0  # tolerance of what is sawn, to either side: feet clamp anywhere along
+CUT_MM = 1.0  # tolerance of what is sawn, to either side: brackets clamp anywhere along
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,9 +80,9 @@ def stock_layout(site: Site, before: FrameLayout) -> Stock:
     upright, length, bars = _uprights(site, before.of(BearingHead))
     plate, body, corner = _plate(site, before.brackets)
     return Stock(
-        purchased=(body, *bars),
+        purchased=(body, *(bar.component for bar in bars)),
         fasteners=tuple(_plate_fasteners(site, before.brackets)),
-        listed={plate.name: 1, upright.name: UPRIGHTS},
+        listed={plate.name: 1, upright.name: len(UPRIGHTS)},
         plate=plate,
         corner=corner,
         holes=np.vstack([bracket.holes for bracket in before.brackets]),
@@ -109,86 +94,26 @@ def stock_layout(site: Site, before: FrameLayout) -> Stock:
 
 
 def feet_layout(site: Site, before: FrameLayout) -> Mounted:
-    """The feet on the fronts and the backs of both uprights."""
-    face = before.of(BearingHead).face
-    return Mounted(brackets=tuple(_upright_foot(site, face, side) for side in (1, -1)))
+    """Corner brackets on the fronts and the backs of both uprights."""
+    _, _, bars = _uprights(site, before.of(BearingHead))
+    brackets = [one for bar in bars for one in bar.brackets(((1, 0), (-1, 0)))]
+    return Mounted(brackets=tuple(brackets), listed={CORNER: len(brackets)})
 
 
-def _upright_foot(site: Site, face: float, side: int) -> Bracket:
-    """A foot on the front (side 1) or the back (side -1) of both uprights.
-
-    face is the level coordinate of the uprights' front.
-    """
-    spec, axes = site.spec.prototype.frame, site.axes
-    low, thick, half = spec.floor_mm, spec.flange_mm, spec.uprights_mm / 2 + HALF_FLANGE_MM
-    start = face if side > 0 else face - EXTRUSION_MM
-
-    def at(depth: float, height: float) -> tuple[float, float]:
-        return start + side * depth, low + height
-
-    def plate(depth: float, height: float) -> Primitive:
-        (x0, z0), (x1, z1) = at(0.0, 0.0), at(depth, height)
-        return level_prism(rectangle((min(x0, x1), z0), (max(x0, x1), z1)), -half, half, axes)
-
-    inside = thick - OVERLAP_MM
-    corners = np.array(
-        [
-            at(inside, inside),
-            at(FOOT_DEPTH_MM - WEB_SETBACK_MM, inside),
-            at(inside, FOOT_HEIGHT_MM - WEB_SETBACK_MM),
-        ]
-    )
-    added = [plate(thick, FOOT_HEIGHT_MM), plate(FOOT_DEPTH_MM, thick)]
-    added += webs(corners, FOOT_WEB_MM, spec.web_mm, axes)
-    screw, _ = at(FOOT_DEPTH_MM - FOOT_SCREW_MM, 0.0)
-    _, height = at(0.0, FOOT_HEIGHT_MM - FOOT_SCREW_MM)
-    across = (-spec.uprights_mm / 2, spec.uprights_mm / 2)
-    under = [np.array([screw, y, low]) @ axes for y in across]
-    in_uprights = [np.array([start, y, height]) @ axes for y in across]
-    removed = drilled_holes(under, thick * axes[2], M5_HOLE_MM)
-    removed += drilled_holes(in_uprights, side * thick * axes[0], M5_HOLE_MM)
-    component = Component(
-        "upright_foot_front" if side > 0 else "upright_foot_back",
-        "foot of the uprights",
-        tuple(added),
-        tuple(removed),
-        (-axes[2], -side * axes[0]),
-    )
-    ends = (start, start + side * FOOT_DEPTH_MM)
-    foot = np.array([[x, y] for x in ends for y in (-half, half)])
-    in_plate = np.array([[screw, y] for y in across])
-    inward = -side * axes[0]
-    fasteners = on_uprights(component.name, in_uprights, inward, thick, site.parts)
-    return Bracket(component, in_plate, foot, fasteners)
-
-
-def _uprights(site: Site, head: BearingHead) -> tuple[PurchasedPart, float, list[Component]]:
-    """Part and length of the uprights, and their bodies."""
-    spec, axes = site.spec.prototype.frame, site.axes
-    length = head.top - spec.floor_mm
+def _uprights(site: Site, head: BearingHead) -> tuple[PurchasedPart, float, list[StandingBar]]:
+    """Part and length of the uprights, and both of them."""
+    spec = site.spec.prototype.frame
+    length, x = head.top - spec.floor_mm, head.face - EXTRUSION_MM / 2
     hint = "make prototype.frame.floor_mm greater, or add a longer one"
     part = choose_part(site.parts, "extrusions", "prototype.frame.floor_mm", hint, length_mm=length)
-    half, uprights = EXTRUSION_MM / 2, []
-    for name, sign in (("upright_left", 1), ("upright_right", -1)):
-        y = sign * spec.uprights_mm / 2
-        low = head.face - EXTRUSION_MM, y - half, spec.floor_mm
-        body = box(low, (head.face, y + half, head.top), axes)
-        what = f"{part.what}, cut to {length:.1f} mm"
-        slots = _slots(part["slot_mm"], (head.face - half, y), (spec.floor_mm, head.top), axes)
-        uprights.append(Component(name, what, (body,), slots, part=part.name))
-    return part, length, uprights
-
-
-def _slots(
-    width: float, middle: tuple[float, float], heights: tuple[float, float], axes: Floats
-) -> tuple[Primitive, ...]:
-    """The four slots of an extrusion, simplified: as wide inside as at its face."""
-    half, inner, outer = width / 2, EXTRUSION_MM / 2 - SLOT_DEPTH_MM, EXTRUSION_MM / 2 + THROUGH_MM
-    low, high = (np.array([*middle, z]) for z in (heights[0] - THROUGH_MM, heights[1] + THROUGH_MM))
-    ends = ((inner, outer), (-outer, -inner))
-    sides = [((a, -half, 0.0), (b, half, 0.0)) for a, b in ends]
-    sides += [((-half, a, 0.0), (half, b, 0.0)) for a, b in ends]
-    return tuple(box(low + one, high + other, axes) for one, other in sides)
+    ends, across = (spec.floor_mm, head.top), spec.uprights_mm / 2
+    middles = (np.array([x, side * across]) for side in (1, -1))
+    bars = zip(UPRIGHTS, middles, strict=True)
+    return (
+        part,
+        length,
+        [StandingBar(name, part, middle, ends, site.axes, site.parts) for name, middle in bars],
+    )
 
 
 def _plate(site: Site, brackets: Sequence[Bracket]) -> tuple[PurchasedPart, Component, Floats]:
@@ -218,14 +143,15 @@ def _plate(site: Site, brackets: Sequence[Bracket]) -> tuple[PurchasedPart, Comp
 
 
 def _plate_fasteners(site: Site, brackets: Sequence[Bracket]) -> Iterator[Fastener]:
-    """Screws with washers through the brackets' feet into the base plate's threads."""
+    """Screws with washers through brackets into threads of the base plate, by their diameter."""
     spec, axes = site.spec.prototype.frame, site.axes
-    screw = choose_screw(site.parts, 5.0, spec.flange_mm + 2 * ENGAGEMENT_MM)
     washer, down = site.parts[WASHER], -axes[2]
     for bracket in brackets:
+        thick = bracket.thickness or spec.flange_mm
+        screw = choose_screw(site.parts, M5_MM, washer["thickness_mm"] + thick + M5_MM)
         through = (bracket.component.name, "plate")
         for x, y in bracket.holes.tolist():
-            place = np.array([x, y, spec.floor_mm + spec.flange_mm]) @ axes
+            place = np.array([x, y, spec.floor_mm + thick]) @ axes
             yield Fastener(washer, place, down, through[:1])
             yield Fastener(screw, place - washer["thickness_mm"] * down, down, through)
 
@@ -249,15 +175,16 @@ def shop_step(machine: AssembledMachine) -> Words:
     )
 
 
-@planned("Feet and uprights on the plate", "upright_*")
+@planned("Uprights on the plate", "upright_*")
 def frame_step(machine: AssembledMachine) -> Words:
-    """Feet and uprights; how many T-nuts each upright has in its front slot and in its back one."""
+    """Brackets and uprights; T-nuts in the front slot of each and in its back one."""
     axis = np.array(machine.record.frame.axis)
-    nuts = [one.along @ axis for one in machine.fasteners if machine.kind(one.part) == "tnuts"]
+    some = [one for one in machine.fasteners if machine.kind(one.part) == "tnuts"]
+    nuts = [one.along @ axis for one in some if one.through[-1] in UPRIGHTS]
     # Screws go in from the front against the axis, which leans from the uprights to the camera.
     front = sum(along < 0 for along in nuts)
     back = len(nuts) - front
-    return told_words(__name__, "frame", front=front // UPRIGHTS, back=back // UPRIGHTS)
+    return told_words(__name__, "frame", front=front // len(UPRIGHTS), back=back // len(UPRIGHTS))
 
 
 def plate_sheet(stock: Stock, bill: PartsList) -> Sheet:
@@ -335,7 +262,7 @@ def upright_sheet(stock: Stock, screws: Sequence[float], bill: PartsList) -> She
     text = (
         f"Saw from {part.what}.",
         f"Length {length:.1f} ± {CUT_MM:g}, both of the same length to 0.2; ends square to 0.2.",
-        "No holes: head and feet are held by T-nuts in the slots. Deburr both ends.",
+        "No holes: head and brackets are held by T-nuts in the slots. Deburr both ends.",
         *LAMP_NOTES[len(heights)],
     )
     entities = [

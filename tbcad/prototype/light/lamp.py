@@ -1,6 +1,7 @@
 """The lamps as data: strips, places, bodies, and what holds them."""
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,16 +11,18 @@ from tbcad.core.geometry.rotations import even_angles, unit_circle
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.prototype import PrototypeSpec, StageSpec
+from tbcad.prototype.frame.corner import CORNER, StandingBar
 from tbcad.prototype.frame.shared import (
     CLEARANCE_HOLE_MM,
     EXTRUSION_MM,
     THROUGH_MM,
+    UPRIGHTS,
     drilled_holes,
     on_uprights,
 )
 from tbcad.prototype.keepout import KeepOut
-from tbcad.prototype.part import Bracket, Mounted
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.prototype.part import Mounted
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part
 from tbcad.types import Floats
 
 STRIP, SHORT_STRIP = "STRIP-COB-24V", "STRIP-240-24V"
@@ -28,13 +31,9 @@ ROOM_SIDES = 12
 EDGE_POINTS = 9
 MARCHES, NEAR_MM = 48, 0.5  # steps along a line of light, and how near to the base it may come
 HOLDER_MM = 8.0  # thickness behind the strips
-COLUMN_MM = 14.0  # depth of a stand's column behind its holder's face
-COLUMN_OUT_MM = 6.0  # by which columns stand farther out than upright lamps, away from the camera
-# A stand's foot, from the column's middle: to either side along x, inward and outward along y, and
-# to its two screws.
-OFF_CAMERA_MM = 3.0  # from columns and feet to the camera
-FOOT_HALF_MM, FOOT_IN_MM, FOOT_OUT_MM = 18.0, 10.0, 34.0
-SCREW_SIDE_MM, SCREW_OUT_MM = 10.0, 25.0
+POST_OUT_MM = 6.0  # by which posts with holders stand farther out than upright lamps
+OFF_CAMERA_MM = 3.0  # from posts to the camera and its mount
+POSTS = "lamp_post_left", "lamp_post_right"  # before the camera, at positive y and at negative
 OUT_MM = 12.0  # by which upright lamps are farther out than the uprights' middles
 TAIL_MM = 34.0  # of a holder on an upright below the strips, for its two screws
 TAIL_SCREWS_MM = (9.0, 25.0)  # below the strips
@@ -46,7 +45,7 @@ HALF_TURN = np.array([[1.0, 1, 1], [-1, -1, 1]])  # of two lamps
 
 @dataclass(frozen=True, kw_only=True)
 class LampLayout(Mounted):
-    """The lamps: strips as purchased bodies, stands as brackets, holders on the uprights."""
+    """The lamps: strips and posts as purchased bodies, holders on uprights or posts."""
 
     strip: PurchasedPart  # that they are made of, from the lists
     strips: int  # number of strips on each, side by side
@@ -56,7 +55,12 @@ class LampLayout(Mounted):
     inward: Floats  # unit directions that they shine in, (l, 3)
     # heights (z) of the holders' screws on each upright, the upper first, mm
     screws: tuple[float, ...]
-    column: float  # y of the middles of the stands' columns, at either side, mm
+    column: float  # y of the middles of the posts, at either side, mm
+
+    @property
+    def bodies(self) -> tuple[Component, ...]:
+        """Those of the strips, in the order of their places."""
+        return self.purchased[-len(self.places) :]
 
     @property
     def width(self) -> float:
@@ -168,7 +172,7 @@ class Lamps:
     face: float  # x of the uprights' front, mm
     strip: PurchasedPart  # part
     aside: float | None  # y of level lamps, mm; None: they are upright
-    camera: float = 0.0  # half width of the camera, which columns stand beside
+    camera: float = 0.0  # half width of what posts stand beside: the camera, or its mount
 
     @property
     def level(self) -> bool:
@@ -202,65 +206,69 @@ class Lamps:
         return self.spec.frame.uprights_mm / 2
 
     @property
-    def column(self) -> float:
-        """Y of the columns' middles, at either side."""
-        return self.across + OUT_MM + COLUMN_OUT_MM + self.aside_camera
+    def on_posts(self) -> bool:
+        """Whether lamps before the camera stick on the posts themselves, without holders."""
+        inner = self.across + OUT_MM - EXTRUSION_MM / 2
+        narrow = self.half <= EXTRUSION_MM / 2 and self.camera + OFF_CAMERA_MM <= inner
+        return not self.level and narrow
 
     @property
-    def aside_camera(self) -> float:
-        """How much farther out columns are for a wide camera."""
-        usual = self.across + OUT_MM + COLUMN_OUT_MM
-        return max(self.camera + FOOT_IN_MM + OFF_CAMERA_MM - usual, 0.0)
+    def column(self) -> float:
+        """Y of the posts' middles, at either side."""
+        usual = self.across + OUT_MM
+        if self.on_posts:
+            return usual
+        return max(usual + POST_OUT_MM, self.camera + OFF_CAMERA_MM + EXTRUSION_MM / 2)
+
+    def post_face(self, place: Floats) -> float:
+        """X of the posts' faces toward the object."""
+        strips = float(place[0]) + self.strip["thickness_mm"]
+        return strips if self.on_posts else strips + HOLDER_MM
 
     def screws(self, place: Floats) -> list[Floats]:
-        """Places of a holder's screws on the uprights' faces, the upper first."""
+        """Places of a holder's screws on the faces of uprights or posts, the upper first."""
+        front = place[0] > 0
+        x, y = (self.post_face(place), self.column) if front else (self.face, self.across)
         if self.level:
-            return [np.array([self.face, side * self.across, place[2]]) for side in (1, -1)]
-        y, end = np.sign(place[1]) * self.across, float(place[2]) - self.sides[1] / 2
-        return [np.array([self.face, y, end - down]) for down in TAIL_SCREWS_MM]
+            return [np.array([x, side * y, place[2]]) for side in (1, -1)]
+        end = float(place[2]) - self.sides[1] / 2
+        return [np.array([x, np.sign(place[1]) * y, end - down]) for down in TAIL_SCREWS_MM]
 
     def holder(self, number: int, place: Floats) -> Component:
-        """A bar across both uprights, or a plate on one with its screws below the strips."""
-        where, y = "both uprights", np.array([-1, 1]) * (self.across + EXTRUSION_MM / 2)
-        if not self.level:
-            ends = self.across - EXTRUSION_MM / 2, abs(float(place[1])) + self.half
-            where, y = "an upright", np.sort(np.sign(place[1]) * np.array(ends))
-        plate = self._plate(place, y, self._heights(place, TAIL_MM))
-        holes = drilled_holes(self.screws(place), HOLDER_MM * LEVEL, CLEARANCE_HOLE_MM[SCREW_MM])
-        what = f"holder of lamp {number} on {where}"
-        return Component(f"lamp_holder_{number}", what, (plate,), tuple(holes), (-LEVEL,))
+        """A bar across two uprights or posts, or a plate on one with its screws below the strips.
 
-    def stand(self, number: int, place: Floats) -> Bracket:
-        """A bridge on two columns past the camera, or a plate on one; a foot has two screws."""
-        what, sides = f"bridge of lamp {number} over the camera", [1.0, -1.0]
-        y, heights = np.array([-self.column, self.column]), self._heights(place, EDGE_MM)
+        A plate lies flat on its printed face; turned over, one of the right side is one of the
+        left.
+        """
+        screws, half = self.screws(place), EXTRUSION_MM / 2
+        across, what = abs(float(screws[0][1])), "uprights" if place[0] < 0 else "posts"
+        y = np.array([-1, 1]) * (across + half)
         if not self.level:
-            side, end = float(np.sign(place[1])), abs(float(place[1]))
-            what, sides = f"stand of lamp {number}", [side]
-            y = np.sort(side * np.array([end - self.half, end + self.half + self.aside_camera]))
-        x = float(place[0]) + self.strip["thickness_mm"] + COLUMN_MM / 2
-        floor, flange = self.spec.frame.floor_mm, self.spec.frame.flange_mm
-        feet, holes, added = list[Floats](), list[Floats](), list[Primitive]()
-        half, beside = np.array([COLUMN_MM / 2, FOOT_IN_MM]), np.array([[-1, 0], [1, 0]])
-        for side in sides:
-            middle = np.array([x, side * self.column])
-            out = np.sort(middle[1] + side * np.array([-FOOT_IN_MM, FOOT_OUT_MM]))
-            foot = np.array([[x - FOOT_HALF_MM, out[0]], [x + FOOT_HALF_MM, out[1]]])
-            column = (middle - half, middle + half)
-            for (low, high), top in ((foot, floor + flange), (column, heights[1])):
-                added.append(box((*low, floor), (*high, top)))
-            feet.append(foot)
-            holes.append(middle + SCREW_SIDE_MM * beside + [0.0, side * SCREW_OUT_MM])
-        places = np.vstack(holes)
-        starts = [np.array([*hole, floor]) for hole in places]
-        component = Component(
-            f"lamp_stand_{number}",
-            what,
-            (*added, self._plate(place, y, heights)),
-            tuple(drilled_holes(starts, flange * UP, CLEARANCE_HOLE_MM[SCREW_MM])),
-            (LEVEL, -UP),
+            lamp = abs(float(place[1]))
+            ends = min(across - half, lamp - self.half), max(across + half, lamp + self.half)
+            y = np.sort(np.sign(place[1]) * np.array(ends))
+        plate = self._plate(place, y, self._heights(place, TAIL_MM))
+        outward = np.sign(place[0]) * LEVEL
+        holes = drilled_holes(screws, -HOLDER_MM * outward, CLEARANCE_HOLE_MM[SCREW_MM])
+        what = (
+            f"holder of lamp {number} on both {what}"
+            if self.level
+            else (f"holder of lamp {number} on one of the {what}")
         )
-        return Bracket(component, places, np.vstack(feet))
+        return Component(f"lamp_holder_{number}", what, (plate,), tuple(holes), (outward,))
+
+    def posts(self, place: Floats) -> list[StandingBar]:
+        """Both posts before the camera, up to the upper end of what they carry."""
+        low, high = self.spec.frame.floor_mm, self._heights(place, EDGE_MM)[1]
+        hint = "make prototype.frame.floor_mm greater, or add a longer one"
+        key = "prototype.frame.floor_mm"
+        part = choose_part(self.parts, "extrusions", key, hint, length_mm=high - low)
+        x = self.post_face(place) + EXTRUSION_MM / 2
+        middles = (np.array([x, side * self.column]) for side in (1, -1))
+        bars = zip(POSTS, middles, strict=True)
+        return [
+            StandingBar(name, part, at, (low, high), np.eye(3), self.parts) for name, at in bars
+        ]
 
     def strips(self, number: int, place: Floats, cut: str) -> Component:
         """The strips of a lamp, as one body."""
@@ -282,31 +290,45 @@ class Lamps:
         """The lamps at a height."""
         places = self.places(z)
         numbered = list(enumerate(places, 1))
-        before = [one for one in numbered if one[1][0] > 0]
-        behind = [one for one in numbered if one[1][0] < 0]
-        strips = self.spec.light.strips
+        held = [one for one in numbered if one[1][0] < 0 or not self.on_posts]
+        strips, posts = self.spec.light.strips, self.posts(places[0])
+        brackets = [
+            one
+            for post, side in zip(posts, (1, -1), strict=True)
+            for one in post.brackets(((-1, 0), (0, side)))
+        ]
+        listed = Counter({CORNER: len(brackets), posts[0].part.name: len(posts)})
+        listed[self.strip.name] = math.ceil(len(places) * strips * self.length / 1e3)
         return LampLayout(
-            brackets=tuple(self.stand(number, place) for number, place in before),
-            printed=tuple(self.holder(number, place) for number, place in behind),
-            purchased=tuple(
-                self.strips(number, place, f"{strips} of {self.length:g} mm")
-                for number, place in numbered
+            brackets=tuple(brackets),
+            printed=tuple(self.holder(number, place) for number, place in held),
+            purchased=(
+                *(post.component for post in posts),
+                *(
+                    self.strips(number, place, f"{strips} of {self.length:g} mm")
+                    for number, place in numbered
+                ),
             ),
             fasteners=tuple(
                 fastener
-                for number, place in behind
+                for number, place in held
                 for fastener in on_uprights(
-                    f"lamp_holder_{number}", self.screws(place), -LEVEL, HOLDER_MM, self.parts
+                    f"lamp_holder_{number}",
+                    self.screws(place),
+                    np.sign(place[0]) * LEVEL,
+                    HOLDER_MM,
+                    self.parts,
+                    POSTS if place[0] > 0 else UPRIGHTS,
                 )
             ),
-            listed={self.strip.name: math.ceil(len(places) * strips * self.length / 1e3)},
+            listed=listed,
             strip=self.strip,
             strips=strips,
             length=self.length,
             level=self.level,
             places=places,
             inward=-np.sign(places[:, :1]) * LEVEL,
-            screws=tuple(dict.fromkeys(float(at[2]) for at in self.screws(behind[0][1]))),
+            screws=tuple(dict.fromkeys(float(at[2]) for at in self.screws(places[-1]))),
             column=self.column,
         )
 

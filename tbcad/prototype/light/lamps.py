@@ -1,8 +1,8 @@
-"""Lamps below the horizon: LED strips on the uprights, and on stands before the camera.
+"""Lamps below the horizon: LED strips on the uprights, and on posts before the camera.
 
 Four upright lamps are images of one another in the planes x = 0 and y = 0. Where they have no
 room, two level ones are each other's image by the half turn about z, on a bar across the uprights
-and on a bridge over the camera: decision 0014.
+and on one across the posts, over the camera: decision 0014.
 """
 
 from collections.abc import Sequence
@@ -33,6 +33,8 @@ from tbcad.prototype.frame.shared import EXTRUSION_MM, BearingHead
 from tbcad.prototype.keepout import min_distance
 from tbcad.prototype.light.lamp import (
     EDGE_MM,
+    OFF_CAMERA_MM,
+    POSTS,
     SHORT_STRIP,
     STRIP,
     TAIL_MM,
@@ -47,7 +49,7 @@ from tbcad.types import Floats
 
 # By how much level lamps are beside the plane y = 0: where the base hides one side, the other.
 ASIDE_MM = (0.0, -5.0, 5.0, -10.0, 10.0, -15.0, 15.0)
-FOOT_HEIGHT_MM = 50.0  # of the uprights' feet, which holders stay above
+FOOT_HEIGHT_MM = 30.0  # of the uprights' corner brackets, which holders stay above
 HEAD_MM = 8.5  # of a holder's screw, which strips keep clear of
 OFF_PARTS_MM = 1.0  # of level lamps and what holds them from other static parts
 STEP_MM = 2.5  # between heights that are tried
@@ -68,10 +70,10 @@ def lamp_layout(site: Site, before: FrameLayout) -> LampLayout | None:
     spec, face = site.spec.prototype, before.of(BearingHead).face
     strip, short = site.parts[STRIP], site.parts[SHORT_STRIP]
     mount = before.find(CameraMount)
-    wide = mount.chosen.half_width if mount and mount.chosen else 0.0
+    wide = _beside_posts(mount, face) if mount else 0.0
     tries = (strip, None), *product((strip, short), ASIDE_MM)
     found = [Lamps(spec, site.parts, face, *one, wide) for one in tries]
-    camera = mount.purchased if mount and wide else ()
+    camera = mount.purchased if mount and mount.chosen else ()
     search = _LampSearch(site, (*before.printed, *before.purchased), camera)
     section = spec.light
     if (current := found[0].layout(-1.0).current_ma) > MAX_MA:
@@ -92,6 +94,13 @@ def lamp_layout(site: Site, before: FrameLayout) -> LampLayout | None:
             f"{search.fault(found[1], z)}: set it to auto, or to 0 for no lamps"
         )
     return fitting.layout(z)
+
+
+def _beside_posts(mount: CameraMount, face: float) -> float:
+    """Half width of what posts stand beside, mm; face: x of the uprights' front."""
+    wide = mount.chosen.half_width if mount.chosen else 0.0
+    foot, posts_end = mount.brackets[0].foot, EXTRUSION_MM + OFF_CAMERA_MM - face
+    return max(wide, float(foot[:, 1].max())) if foot[:, 0].min() < posts_end else wide
 
 
 @dataclass(frozen=True)
@@ -123,7 +132,7 @@ class _LampSearch:
         layout = lamps.layout(z)
         bodies = _bodies(layout)
         if in_view(bodies, self.site.layout.array.camera):
-            return "the camera sees a lamp or its stand"
+            return "the camera sees a lamp or its post"
         if name := _met(bodies, self.beside if lamps.level else self.camera):
             return f"a lamp or its holder meets the {name.replace('_', ' ')}"
         for what, distance in (
@@ -143,8 +152,8 @@ def _lowest(lamps: Lamps, z: float) -> float:
 
 def _bodies(layout: LampLayout) -> list[Primitive]:
     """Bodies of lamps and of what holds them."""
-    stands = (stand.component for stand in layout.brackets)
-    parts = (*stands, *layout.printed, *layout.purchased)
+    corners = (corner.component for corner in layout.brackets)
+    parts = (*corners, *layout.printed, *layout.purchased)
     return [body for part in parts for body in part.added]
 
 
@@ -167,22 +176,27 @@ def _box(body: Primitive) -> tuple[Floats, Floats]:
 
 @planned("Lamps", "lamp_*", loose=("strips",), near=("plate",))
 def lamps_step(machine: AssembledMachine) -> Words:
-    """Stands, holders and strips."""
+    """Posts, holders and strips."""
     light = machine.record.lamps
     assert light is not None
     drawing = machine.record.drawing_of(light.strip)
+    post = next(one for one in machine.record.bought if one.name == POSTS[0])
     does = [
-        "Screw the bridge's feet on the plate with washers, on both sides of the camera's place; "
-        "the plate's drawing says which holes are theirs. Screw the bar on the fronts of both "
-        "uprights with its T-nuts, as high as the upright's drawing has it."
-        if light.level
-        else "Screw the stands on the plate with washers; its drawing says which holes are theirs. "
-        "Screw the holders on the fronts of the uprights with their T-nuts, as high as the "
-        "upright's drawing has it.",
+        f"Saw both posts from {machine.ref(post.part or '')}: {post.what.rpartition(', ')[2]}, "
+        "ends square to 0.2 mm. Deburr them.",
+        "Slide their T-nuts in, stand them on the plate in their corner brackets, on both sides "
+        "of the camera's place, and screw them down; the plate's drawing says which holes are "
+        "theirs.",
+        "Screw the holders with their T-nuts on the fronts of the uprights, as high as the "
+        "upright's drawing has it"
+        + when(machine.has("lamp_holder_1"), ", and on the posts, flush with their upper ends")
+        + ".",
         f"Cut the strip {machine.ref(light.strip)} at its marks: {light.strips} pieces of "
         f"{light.length_mm:.0f} mm for each of the {len(light.places)} lamps"
         f"{when(drawing, f' ({drawing})')}. Solder a cable to each piece, plus to plus.",
-        "Stick them on the lamps' faces, toward the object.",
+        "Stick them on the lamps' faces, toward the object: on the holders"
+        + when(not machine.has("lamp_holder_1"), " and on the posts themselves")
+        + ".",
     ]
     checks = [
         f"At 24 V all of them light up and draw {light.current_ma:.0f} mA together.",
@@ -233,14 +247,14 @@ def _place_note(lamps: LampLayout) -> str:
     if not lamps.level:
         half = max(lamps.width / 2 + EDGE_MM, EXTRUSION_MM / 2)
         return (
-            f"Stick them upright on the printed face, side by side, {EDGE_MM:g} below its upper "
-            f"end: in the middle of a stand, their middle {half:g} from the outer edge of a holder."
+            f"Stick them upright, side by side, {EDGE_MM:g} below the upper end of post or holder: "
+            f"in the middle of a post, their middle {half:g} from the outer edge of a holder."
         )
     aside = abs(float(lamps.places[0, 1]))
     middle = (
-        f"their middle {aside:g} beside the middle of bar and bridge, on opposite sides"
+        f"their middle {aside:g} beside the middle of both bars, on opposite sides"
         if aside
-        else "in the middle of bar and bridge"
+        else "in the middle of both bars"
     )
     return (
         f"Stick them level on the printed face, one above the other, at half its height, {middle}."

@@ -20,13 +20,17 @@ KINDS = (
     *("motors", "stages", "wheels", "belts", "couplings", "shafts", "bearings", "screws"),
     *("setscrews", "inserts", "dowels", "magnets", "leds", "strips", "sheets", "resistors"),
     *("wires", "connectors", "boards", "electronics", "extrusions", "tnuts", "nuts", "washers"),
-    *("collars", "spacers", "brakes", "plates"),
+    *("collars", "spacers", "brakes", "plates", "brackets", "tubes", "clamps"),
 )
 """Lists of parts, in the order in which they are listed. Their own columns are sizes above zero.
 
 shaft_length_mm is the length of a motor's shaft from the face that its screws pull on the plate.
 radial_n is the load at the end of a motor's shaft that its bearings bear for 30,000 h.
 hole_square_mm is the side of a square of holes, hole_circle_mm the diameter of a circle of holes.
+Of a clamp length_mm and width_mm are those of its flange and its collar, flange_mm and height_mm
+their heights; two holes of hole_mm are holes_mm apart. Of a corner bracket leg_mm is the length of
+both legs, base_mm and side_mm are thicknesses of a leg and of a side, hole_mm is from the corner to
+the middle of the slots, slot_mm their length.
 """
 MAX_VALUE = 1e6  # of any size or mass
 SAME_SIZE_MM = 1e-6  # sizes are equal up to rounding

@@ -32,7 +32,9 @@ RIM_MM = 1.8  # thickness of the crown at its rim
 ARC_CHORDS = 8  # of the crown's underside
 SHOULDER_MM = 2.0  # height of the post's full width above the joint
 PLUG_MM, PLUG_PLAY_MM = 15.0, 0.1  # length of the plug in the post, and its play
-SET_SCREW_MM = 2.8  # hole that an M3 set screw cuts its thread in
+SET_SCREW_MM = 2.8  # hole that an M3 set screw's end goes into
+TAPPED_M3_MM = 2.5
+WIRES_MM = 6.0  # hole for the wires in the post
 SEAT_MM = 1.0  # depth of the plug's hole for the set screw's end
 GROOVE_MM = 1.6  # depth of the wires' grooves
 OPEN_MM = 0.5  # by which a groove reaches into the pillar that it comes from
@@ -270,18 +272,23 @@ def disc_component(stage: StageSpec, leds: Floats, sizes: CrownSizes) -> Compone
     )
 
 
-def post_component(sizes: CrownSizes, foot: float) -> Component:
-    """A tube down to a height (mm), with a hole for the set screw that holds the plug."""
+def post_component(sizes: CrownSizes, tube: PurchasedPart, foot: float, wires: float) -> Component:
+    """A tube down to a height (mm), with a thread for the set screw that holds the plug.
+
+    In line with it is a hole for the wires, at another height.
+    """
     top, bottom = np.array([0, 0, sizes.joint]), np.array([0, 0, foot])
     beyond = np.array([0, 0, THROUGH_MM])
-    screw = top - [0, 0, PLUG_MM / 2]
+    screw, way = top - [0, 0, PLUG_MM / 2], np.array([0, 0, wires])
+    long = sizes.post + THROUGH_MM
     return Component(
         "stage_post",
-        "post of the object stage",
+        f"{tube.what}, cut to {sizes.joint - foot:.1f} mm",
         (cylinder_between(bottom, top, sizes.post),),
         (
             cylinder_between(bottom - beyond, top + beyond, sizes.post - sizes.wall),
-            Cylinder(screw, SCREW_DIRECTION, SET_SCREW_MM / 2, sizes.post + THROUGH_MM),
+            Cylinder(screw, SCREW_DIRECTION, TAPPED_M3_MM / 2, long),
+            Cylinder(way, SCREW_DIRECTION, min(WIRES_MM, sizes.post) / 2, long),
         ),
-        (-UP, UP, LEVEL),
+        part=tube.name,
     )

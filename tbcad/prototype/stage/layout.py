@@ -18,7 +18,7 @@ from tbcad.core.spec.prototype import PrototypeSpec, StageSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.keepout import KeepOut, min_distance
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
 from tbcad.prototype.stage.crown import (
     DISC_MM,
     INSIDE_MM,
@@ -28,6 +28,7 @@ from tbcad.prototype.stage.crown import (
     SEAT_MM,
     SHOULDER_MM,
     UP,
+    WIRES_MM,
     CrownSizes,
     crown_component,
     disc_component,
@@ -40,8 +41,7 @@ MAX_NECK_MM = 6.0  # radius of the crown's neck where it leaves the sphere
 NECK_SHARE = 0.95  # of the radius at which light grazes the sphere's bottom
 NECK_OF_POST = 0.65  # largest share of the post's radius
 BELOW_MM = 1.5  # length of the neck below the sphere
-MIN_POST_MM = 4.0  # radius, for the LEDs' wires
-WALL_OF_POST = 0.3  # largest share of the post's radius
+WIRES_UP_MM = 8.0  # of the wires' hole above the clamp
 SHELF_MM = 1.0  # smallest width of the crown's plate beyond the neck
 # Light may be taken from the sphere's bottom within this: its hulls are up to 2.5 mm too large.
 GRAZING_MM = 0.15
@@ -57,7 +57,9 @@ class StageLayout:
     foot: float  # z of the post's lower end, mm
     led: PurchasedPart  # of the pockets, from the lists
     leds: Floats  # centres of the domes, mm, (l, 3)
-    components: tuple[Component, ...]  # disc, crown and post, to be printed
+    components: tuple[Component, ...]  # disc and crown, to be printed
+    post: Component  # a tube
+    clamp: PurchasedPart  # that holds the post on the plate
     light: float  # smallest distance of all to the light outside the capture sphere, mm
     swept: float  # smallest distance to what the base sweeps, mm
 
@@ -67,7 +69,13 @@ def stage_layout(
 ) -> StageLayout:
     """The stage in the space that balls, base and light leave free; SpecError if there is none."""
     stage = spec.stage
-    post, neck = _radii(spec, _grazing_radius(prototype, keep_out.capture))
+    widest = _widest_tube(spec, parts)
+    post = widest["outer_mm"] / 2
+    neck = min(
+        MAX_NECK_MM,
+        NECK_SHARE * _grazing_radius(prototype, keep_out.capture),
+        NECK_OF_POST * post,
+    )
     led, leds = parts[stage.led], np.array(stage.leds_mm).reshape(-1, 3)
     plate = stage.top_mm - DISC_MM
     pockets = leds[:, 2] - (led["height_mm"] - led["diameter_mm"] / 2)
@@ -78,18 +86,28 @@ def stage_layout(
         neck=neck,
         wire=neck / 2 if len(leds) else 0.0,
         post=post,
-        wall=min(stage.wall_mm, WALL_OF_POST * post),
+        wall=widest["wall_mm"],
         joint=joint,
     )
     check_leds(stage, prototype, keep_out.capture, led, pockets, plate)
-    foot = _foot(spec, joint)
+    key, hint = "prototype.post_diameter_mm", "make it smaller, or add one to the list"
+    clamp = choose_part(parts, "clamps", key, hint, bore_mm=2 * post)
+    foot = _foot(spec, joint, clamp)
+    hint = "make prototype.frame.floor_mm greater, or add a longer one"
+    key, long = "prototype.frame.floor_mm", joint - foot
+    tube = choose_part(parts, "tubes", key, hint, outer_mm=2 * post, length_mm=long)
     components = (
         disc_component(stage, leds, sizes),
         crown_component(stage, led, leds, pockets, sizes),
-        post_component(sizes, foot),
     )
-    light, swept = _check_clearances(components, keep_out, spec.frame.clearance_mm)
-    return StageLayout(sizes, foot, led, leds, components, light, swept)
+    column = post_component(sizes, tube, foot, foot + wires_up(clamp))
+    light, swept = _check_clearances((*components, column), keep_out, spec.frame.clearance_mm)
+    return StageLayout(sizes, foot, led, leds, components, column, clamp, light, swept)
+
+
+def wires_up(clamp: PurchasedPart) -> float:
+    """Height of the wires' hole above the post's lower end, mm."""
+    return clamp["height_mm"] + WIRES_UP_MM
 
 
 def led_poses(stage: StageLayout) -> list[tuple[str, Floats, Floats]]:
@@ -112,21 +130,24 @@ def _grazing_radius(prototype: PrototypeLayout, capture: float) -> float:
     return capture * float(np.sin(descent.min()))
 
 
-def _radii(spec: PrototypeSpec, grazing_radius: float) -> tuple[float, float]:
-    """Radii of post and neck."""
-    post = spec.post_diameter_mm / 2
-    if post == 0:
+def _widest_tube(spec: PrototypeSpec, parts: Parts) -> PurchasedPart:
+    """The widest tube that is no wider than the post may be."""
+    widest = float(spec.post_diameter_mm)
+    if widest == 0:
         raise SpecError(
             "an object held through a hollow hub is not supported, which "
             "prototype.post_diameter_mm 0 asks for: light of the hindmost balls crosses the axis "
             "there, and the shaft fills the bore; set prototype.post_diameter_mm to 20"
         )
-    if post < MIN_POST_MM:
+    tubes = of_kind(parts, "tubes")
+    fitting = [one for one in tubes if one["outer_mm"] <= widest]
+    if not fitting:
+        least = min(one["outer_mm"] for one in tubes)
         raise SpecError(
-            f"prototype.post_diameter_mm {2 * post:g} leaves no room for the LEDs' wires: make it "
-            f"{2 * MIN_POST_MM:g} or more"
+            f"prototype.post_diameter_mm {widest:g} is less than the narrowest tube: make it "
+            f"{least:g} or more"
         )
-    return post, min(MAX_NECK_MM, NECK_SHARE * grazing_radius, NECK_OF_POST * post)
+    return max(fitting, key=lambda one: one["outer_mm"])
 
 
 def _rim(stage: StageSpec, capture: float, plate: float, neck: float) -> float:
@@ -143,14 +164,13 @@ def _rim(stage: StageSpec, capture: float, plate: float, neck: float) -> float:
     return rim
 
 
-def _foot(spec: PrototypeSpec, joint: float) -> float:
-    """Height of the post's lower end, mm."""
-    frame, min_length = spec.frame, 2 * PLUG_MM
-    foot = frame.floor_mm + frame.flange_mm
+def _foot(spec: PrototypeSpec, joint: float, clamp: PurchasedPart) -> float:
+    """Height of the post's lower end, on the plate, mm."""
+    foot, min_length = float(spec.frame.floor_mm), wires_up(clamp) + WIRES_MM + PLUG_MM
     if foot > joint - min_length:
         raise SpecError(
-            f"the post would be too short: make prototype.frame.floor_mm {frame.floor_mm:g} "
-            f"less than {joint - min_length - frame.flange_mm:.0f}"
+            f"the post would be too short: make prototype.frame.floor_mm {foot:g} "
+            f"less than {joint - min_length:.0f}"
         )
     return foot
 

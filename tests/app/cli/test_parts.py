@@ -37,14 +37,15 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_sums_come_first(folder: Path, cli: Command) -> None:
-    first, second, third, fourth, _, *rows = lines = cli("parts", folder).out.splitlines()
+    first, second, summed, third, fourth, _, *rows = lines = cli("parts", folder).out.splitlines()
     assert first == "2 kinds of parts to buy: 3 EUR, 1 of them without a price"
-    assert second == "1 parts to print: 0.2 kg of filament, 6 EUR, 25 h (1.0 days)"
+    assert second == "1 parts to print: 0.2 kg, 6 EUR, 25 h (1.0 days)"
+    assert summed == "in all 8 EUR, as estimated and without shipping"
     assert third.startswith("0.7 kg in all")
     assert fourth.startswith("not in the list: camera, lens")
     assert [row.split()[2] for row in rows] == ["carrier", "608-2Z", "MOTOR"]  # the dearest first
     assert all(len(line) <= 80 for line in lines)
-    rows = cli("parts", folder, "--full").out.splitlines()[5:]
+    rows = cli("parts", folder, "--full").out.splitlines()[6:]
     assert [row.split()[0] for row in rows] == ["1", "2", "3"]  # as in the list
 
 
@@ -66,7 +67,7 @@ def test_a_broken_list(folder: Path, cli: Command) -> None:
     for old, new, message in (
         ("608-2Z", "608-2Z,", "bom.csv, line 2: 18 columns, not 17"),
         ("400.0,400.0", "heavy,400.0", "bom.csv, line 3, column mass_g: no number"),
-        ("printed", "found", "line 4, column from: allowed is bought or printed"),
+        ("printed", "found", "line 4, column from: allowed are bought, printed"),
         ("item", "number", "bom.csv, line 1: the columns must be item,quantity"),
     ):
         path.write_text(text.replace(old, new, 1))

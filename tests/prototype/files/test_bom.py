@@ -8,7 +8,7 @@ import pytest
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.files.bom import PrintedItem, bom_rows, cap_item
+from tbcad.prototype.files.bom import PrintedItem, bom_rows, cap_item, totals, work_rows
 from tbcad.prototype.purchased.parts import load_parts, load_prices
 
 PARTS = load_parts()
@@ -41,3 +41,18 @@ def test_figures_are_rounded_and_equal_balls_share_a_row(layout: PrototypeLayout
 def test_unknown_part(layout: PrototypeLayout) -> None:
     with pytest.raises(SpecError, match="'M3x11' is in no list of purchased parts"):
         bom_rows(layout, DRIVES[0], {"M3x11": 1}, (), 1.27, PARTS, PRICES)
+
+
+def test_finish_of_caps_and_tools_are_paid_but_no_parts(layout: PrototypeLayout) -> None:
+    """They count in the price, and not in the mass."""
+    gauge = PrintedItem("gauge", "of a length", 1e3, (800.0, 0.08), tool=True)
+    parts = bom_rows(layout, DRIVES[0], {}, (*PRINTED, gauge), 1.27, PARTS, PRICES)
+    work = work_rows(layout, len(parts) + 1, PRICES)
+    caps = int(layout.balls.cap.sum())
+    assert [row["quantity"] for row in work if row["part"] == "CAP-FINISH"] == [caps] * bool(caps)
+    assert [row["item"] for row in work] == [*range(len(parts) + 1, len(parts) + len(work) + 1)]
+    before, after = totals(parts), totals([*parts, *work])
+    paid = sum(row["total_price"] for row in work)
+    assert after == before | {"work_price": {"EUR": pytest.approx(paid)}}
+    assert paid > 50
+    assert after["parts_printed"] == len(PRINTED)

@@ -94,7 +94,8 @@ def test_nothing_meets_the_camera(
     mount = mount_of(frame)
     assert mount.riser == riser
     assert {"camera", "camera_lens"} <= {one.name for one in mount.purchased}
-    assert ("camera_riser" in {one.name for one in mount.printed}) == (riser > 0)
+    (fence,) = (one for one in mount.printed if one.name == "camera_fence")
+    assert len(fence.added) == 1 + (riser > 0)
     assert clashes(beside_camera(frame)) == []
     lamps = frame.find(LampLayout)
     assert lamps
@@ -107,7 +108,7 @@ def test_a_camera_through_its_fence_or_into_its_plate_is_found(
     """By what finds nothing in a mount that fits."""
     frame = frame_layout(using(site, lists, camera="cube"))
     back = -site.layout.array.camera.forward
-    for along, other in ((6 * back, "camera_fence"), (np.array([5.0, 0, 0]), "camera_riser")):
+    for along, other in ((6 * back, "camera_fence"), (np.array([9.0, 0, 0]), "camera_plate")):
         parts = {one.name: one for one in beside_camera(frame)}
         body = parts["camera"].added[0]
         moved = replace(body, corners=body.corners + along)  # type: ignore[call-arg,union-attr]
@@ -125,7 +126,7 @@ def test_where_the_cube_is(site: Site, lists: dict[str, str]) -> None:
     mount = camera_mount(named, FrameLayout(()))
     assert mount
     screw = next(one for one in mount.fasteners if one.part.name.startswith("UNC"))
-    assert screw.through == ("camera_plate", "camera_riser", "camera")
+    assert screw.through == ("camera_plate", "camera_fence", "camera")
     # Its end is 4.7 mm in the camera.
     camera = site.layout.array.camera
     out = mount.printed[0].downs[1]

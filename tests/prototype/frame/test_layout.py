@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tbcad.core.geometry.primitives import Component, Cylinder
+from tbcad.core.geometry.primitives import Component, Cylinder, enclosing_triangles
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.arrangement import frame_layout
@@ -16,8 +16,9 @@ from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.base.split import UNCUT
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.frame.camera_mount import CameraMount
+from tbcad.prototype.frame.corner import CORNER
 from tbcad.prototype.frame.head import BearingHead, bearing_head
-from tbcad.prototype.frame.stock import Stock
+from tbcad.prototype.frame.stock import UPRIGHTS, Stock
 from tbcad.prototype.keepout import keep_out_volume
 from tbcad.prototype.part import FrameLayout, Site, frame_axes
 from tbcad.prototype.purchased.parts import choose_part, load_parts
@@ -91,7 +92,7 @@ class TestFrame:
     def test_all_static_parts_are_clear(self, frame: FrameLayout) -> None:
         still = {item.name for item in (*frame.printed, *frame.purchased) if not item.rotates}
         assert set(frame.swept) == still
-        assert set(frame.light) == still - {"camera"}
+        assert set(frame.light) == still - {"camera", "stage_post"}
         assert min(frame.swept.values()) >= SMALL.prototype.frame.clearance_mm
         lamps = {name for name in frame.light if name.startswith("lamp_")}
         assert min(frame.light[name] for name in lamps) >= SMALL.prototype.frame.clearance_mm
@@ -99,8 +100,14 @@ class TestFrame:
 
     def test_uprights_and_plate_are_what_is_sold(self, frame: FrameLayout) -> None:
         stock, floor = frame.of(Stock), SMALL.prototype.frame.floor_mm
-        bars = [item for item in frame.purchased if item.name.startswith("upright")]
+        bars = [item for item in frame.purchased if item.name in UPRIGHTS]
         assert len(bars) == 2
+        corners = [item for item in frame.purchased if item.part == CORNER]
+        assert {item.name.rpartition("_bracket_")[0] for item in corners} >= set(UPRIGHTS)
+        for one in corners:
+            points = enclosing_triangles(one.added[0]).reshape(-1, 3)
+            assert points[:, 2].min() == pytest.approx(floor)
+            assert np.ptp(points[:, 2]) == pytest.approx(PARTS[CORNER]["leg_mm"])
         assert stock.upright["length_mm"] >= stock.length
         assert stock.length == pytest.approx(frame.of(BearingHead).top - floor)
         assert (np.array(stock.plate.sizes[:2]) > np.ptp(stock.holes, axis=0)).all()

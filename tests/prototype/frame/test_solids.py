@@ -7,8 +7,9 @@ from OCP.TopoDS import TopoDS_Shape
 from tbcad.cad.kernel.checks import volume
 from tbcad.core.geometry.vectors import norm
 from tbcad.prototype.base.layout import BaseLayout
+from tbcad.prototype.frame.corner import SLOT_DEPTH_MM
 from tbcad.prototype.frame.shared import CLEARANCE_HOLE_MM, BearingHead
-from tbcad.prototype.frame.stock import SLOT_DEPTH_MM, Stock
+from tbcad.prototype.frame.stock import Stock
 from tbcad.prototype.part import FrameLayout
 from tbcad.prototype.printed import component_solid
 from tests.helpers import cylinders

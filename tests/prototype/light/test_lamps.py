@@ -15,7 +15,7 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.frame.shared import BearingHead
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.light import lamps as searched
-from tbcad.prototype.light.lamp import SHORT_STRIP, SIGNS, LampLayout, hidden_by_base
+from tbcad.prototype.light.lamp import POSTS, SHORT_STRIP, SIGNS, LampLayout, hidden_by_base
 from tbcad.prototype.light.lamps import lamp_layout
 from tbcad.prototype.part import FrameLayout, Mounted, Site
 
@@ -38,7 +38,10 @@ def test_lamps_are_images_of_one_another_that_the_camera_does_not_see(
     assert lamps is not None
     assert lamps.places == pytest.approx(lamps.places[0] * SIGNS)
     assert (lamps.places * lamps.inward).sum(axis=1).max() < 0
-    assert [body.part for body in lamps.purchased] == ["STRIP-COB-24V"] * 4
+    bars = [part.name for part in lamps.purchased if part.name in POSTS]
+    assert bars == [*POSTS]
+    assert [body.part for body in lamps.purchased[2:]] == ["STRIP-COB-24V"] * 4
+    assert [part.name for part in lamps.printed] == ["lamp_holder_3", "lamp_holder_4"]
     assert (lamps.watt, lamps.lumen) == (pytest.approx(4.0), pytest.approx(90.0))
     assert lamps.current_ma == pytest.approx(4000 / 24)
     corners = lamps.outlines().reshape(-1, 3)
@@ -90,10 +93,9 @@ def test_two_level_lamps_where_four_have_no_room(site: Site, frame: FrameLayout)
     assert lamps.level
     assert lamps.places[1] == pytest.approx(lamps.places[0] * [-1, -1, 1])
     assert lamps.sides == (lamps.length, lamps.width)
-    assert [part.name for part in lamps.printed] == ["lamp_holder_2"]
-    (bridge,) = lamps.brackets
-    assert len(bridge.holes) == 4
-    assert len(lamps.fasteners) == 4  # a screw and a nut on each upright
+    assert [part.name for part in lamps.printed] == ["lamp_holder_1", "lamp_holder_2"]
+    assert len(lamps.brackets) == 4
+    assert len(lamps.fasteners) == 8  # a screw and a nut on each upright and each post
     assert lamps.screws == (lamps.places[0, 2],)
 
 
@@ -111,6 +113,6 @@ def test_level_lamps_keep_clear_of_other_parts(site: Site, frame: FrameLayout) -
     with hiding(lambda layout: not layout.level):
         lamps = lit(site, frame)
         assert lamps is not None
-        stand, z = Mounted(brackets=lamps.brackets), float(lamps.places[0, 2])
-        with pytest.raises(SpecError, match="meets the lamp stand 1"):
-            lit(site, frame, stand, lamp_z_mm=z)
+        bar, z = Mounted(printed=lamps.printed), float(lamps.places[0, 2])
+        with pytest.raises(SpecError, match="meets the lamp holder 1"):
+            lit(site, frame, bar, lamp_z_mm=z)

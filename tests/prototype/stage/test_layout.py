@@ -77,10 +77,11 @@ class TestStage:
         bare = stage_with(leds_mm=[])
         assert led_poses(bare) == []
         names = [component.name for component in bare.components]
-        assert names == ["stage_disc", "stage_crown", "stage_post"]
+        assert names == ["stage_disc", "stage_crown"]
+        assert bare.post.part == "TUBE-20x2x250"
 
     def test_the_studs_take_the_disc_two_ways_round(self, stage: StageLayout) -> None:
-        disc, crown, _ = stage.components
+        disc, crown = stage.components
         holes = np.array([hole.start[:2] for hole in disc.removed if isinstance(hole, Cylinder)])
         studs = np.array([b.start[:2] for b in crown.added[1:3] if isinstance(b, Cylinder)])
         assert holes == pytest.approx(studs)

@@ -1,5 +1,6 @@
 """The stage as solids: ways of the wires in the mesh, volumes by closed forms."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +11,6 @@ from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec
-from tbcad.core.spec.prototype import StageSpec
 from tbcad.prototype.printed import PlacedSolid, placed_component
 from tbcad.prototype.stage.crown import DISC_MM, STUD_MM, STUD_PLAY_MM
 from tbcad.prototype.stage.layout import StageLayout
@@ -22,7 +22,8 @@ SIZED = load_spec(None).prototype.stage
 
 @pytest.fixture(scope="module")
 def solids(stage: StageLayout) -> dict[str, PlacedSolid]:
-    return {part.name: placed_component(part, PRINTER, 0.1) for part in stage.components}
+    parts = (*stage.components, replace(stage.post, downs=(np.array([1.0, 0.0, 0.0]),)))
+    return {part.name: placed_component(part, PRINTER, 0.1) for part in parts}
 
 
 @pytest.fixture(scope="module")
@@ -41,13 +42,13 @@ class TestSolids:
             assert mesh.is_winding_consistent
             assert mesh.body_count == 1
             assert mesh.volume == pytest.approx(part.volume, rel=2e-3)
-        disc, wall = SIZED.disc_mm / 2, StageSpec().wall_mm
+        disc, wall = SIZED.disc_mm / 2, 2.0
         stud = min(STUD_MM, disc / 5) + STUD_PLAY_MM
         area = np.pi * (disc**2 - 2 * stud**2)
         assert solids["stage_disc"].volume == pytest.approx(area * DISC_MM, rel=1e-9)
         tube = np.pi * (10.0**2 - (10.0 - wall) ** 2) * (stage.sizes.joint - stage.foot)
-        # The set screw's hole is nearly as long as the wall is thick.
-        hole = np.pi * 1.4**2 * wall
+        # Holes of set screw and wires are nearly as long as the wall is thick.
+        hole = np.pi * (1.25**2 + 3.0**2) * wall
         assert solids["stage_post"].volume == pytest.approx(tube - hole, abs=0.1 * hole)
 
     def test_wires_come_from_every_pocket_to_the_bores_end(
@@ -81,5 +82,5 @@ class TestSolids:
             assert crown.contains(way[46:80] + 1.0 * out).all()
 
     def test_a_bed_too_small_is_refused(self, stage: StageLayout) -> None:
-        with pytest.raises(SpecError, match="stage_post does not fit"):
-            placed_component(stage.components[2], PrinterSpec(bed_mm=(120.0,) * 3), 0.1)
+        with pytest.raises(SpecError, match="stage_crown does not fit"):
+            placed_component(stage.components[1], PrinterSpec(bed_mm=(40.0,) * 3), 0.1)

@@ -16,7 +16,8 @@ pytestmark = pytest.mark.corpus
 
 FIELDS = Path(__file__).parents[3] / "docs" / "fields.md"
 KINDS = {"measured", "worked out", "spec", "form", "hash"}
-MAPS = {"files", "versions", "totals.bought_price", "totals.filament_price"}  # keys are data
+TOTALS = {f"totals.{name}_price" for name in ("bought", "work", "filament")}
+MAPS = {"files", "versions", *TOTALS}  # keys are data
 
 
 def json_fields(value: Any, path: str = "") -> Iterator[str]:

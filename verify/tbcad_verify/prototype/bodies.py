@@ -25,6 +25,7 @@ from tbcad_verify.types import Bools, Floats, Ints
 
 OWN = ("camera", "camera_lens")  # bodies that its own rays start in
 SWUNG, STILL = ("base", "cap"), ("stage", "frame")  # roles of parts that turn with the base or not
+POST = "stage_post"  # bought, and a part of the stage
 LEAST_ANGLES = 7
 LIFT_MM = 1e-3
 
@@ -129,7 +130,7 @@ class Bodies:
 
 def stage_bodies(context: PrototypeContext) -> frozenset[str]:
     """Names of the stage's parts and of the fasteners in them."""
-    parts = {part.name for part in context.prototype.parts if part.role == "stage"}
+    parts = {part.name for part in context.prototype.parts if part.role == "stage"} | {POST}
     some = context.prototype.fasteners
     return frozenset(parts | {one.name for one in some if one.through[0] in parts})
 

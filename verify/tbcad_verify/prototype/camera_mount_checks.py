@@ -127,13 +127,15 @@ def _foot_travel(context: PrototypeContext, bracket: TextSolid) -> float:
 def _camera_faults(
     context: PrototypeContext, solids: Mapping[str, TextSolid], face: float
 ) -> Iterator[str]:
-    """The camera stands on its plate, whose face is so far out, or on a riser between both."""
+    """The camera stands on its plate, whose face is so far out, or on a step of the fence."""
     frame, axes = context.export.spec.prototype.frame, _axes(context)
     stands = frame.camera_axis_mm
-    riser, camera = solids.get("camera_riser"), solids.get("camera")
-    heights = (riser.corners - context.pinhole) @ axes[2] if riser else np.array([face])
+    fence = (solids["camera_fence"].corners - context.pinhole) @ axes.T
+    step = fence[fence[:, 0] < frame.camera_back_mm - SAME_MM, 2]
+    heights = step if len(step) else np.array([face])
     if abs(heights.min() - stands) > SAME_MM or abs(heights.max() - face) > SAME_MM:
-        yield f"the camera plate is {face:.3f} mm from the optical axis, without a riser that fits"
+        yield f"the camera plate is {face:.3f} mm from the optical axis, without a step that fits"
+    camera = solids.get("camera")
     if camera and "camera_lens" in solids:  # else a cylinder stands in for it
         ends = ((camera.corners - context.pinhole) @ axes.T).max(axis=0)
         if abs(ends[2] - stands) > SAME_MM:
@@ -144,14 +146,18 @@ def _camera_faults(
 
 def _fence_faults(context: PrototypeContext, fence: TextSolid, face: float) -> Iterator[str]:
     """The fence lies on the plate, at the camera's back, high and wide enough to hold it."""
-    spec = context.export.spec.prototype
+    frame = context.export.spec.prototype.frame
     corners = (fence.corners - context.pinhole) @ _axes(context).T
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    if abs(low[0] - spec.frame.camera_back_mm) > SAME_MM:
+    lip = corners[corners[:, 2] < frame.camera_axis_mm - SAME_MM]  # beside the camera, over a step
+    if not len(lip):
+        yield "the fence does not reach the camera"
+        return
+    low, high = lip.min(axis=0), lip.max(axis=0)
+    if abs(low[0] - frame.camera_back_mm) > SAME_MM:
         yield f"the fence is {low[0]:.2f} mm behind the pinhole"
-    if abs(high[2] - face) > SAME_MM:
+    if abs(corners[:, 2].max() - face) > SAME_MM:
         yield "the fence does not lie on the camera plate"
-    if spec.frame.camera_axis_mm - low[2] < LIP_MM or high[1] - low[1] < LIP_WIDTH_MM:
+    if frame.camera_axis_mm - low[2] < LIP_MM or high[1] - low[1] < LIP_WIDTH_MM:
         yield "the fence does not keep the camera from turning"
 
 

@@ -36,11 +36,15 @@ IN_PLATE_MM = (4.2,)
 IN_PRINTED_MM = (2.0, 2.8, 3.4, 4.5, 5.5, 6.6)
 # Drawn without holes: bodies of catalogue parts.
 SOLID = frozenset(
-    {*("motor", "rotary_stage", "rotary_stage_top", "camera"), *("upright_left", "upright_right")}
+    {
+        *("motor", "rotary_stage", "rotary_stage_top", "camera"),
+        *("upright_left", "upright_right", "lamp_post_left", "lamp_post_right"),
+    }
 )
 # Smallest grip in nominal diameters: in an insert or aluminium; in a steel nut (thin, ISO 4035).
 GRIP, GRIP_NUT = 1.0, 0.5
 INSERT = "INSERT-"
+BRACKETS = "BRACKET-"  # bought, and drawn with their holes
 NUTS = (INSERT, "TNUT-", "NUT-")  # what a screw is turned into
 MOTOR_DEPTH_MM = 4.5  # of the thread in a NEMA 17 motor's face
 
@@ -234,6 +238,7 @@ def _hole_faults(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> 
     if any(part.name.startswith("carrier_") for part in prototype.parts):
         printed |= {base.dowel_mm + base.dowel_press_mm, base.dowel_mm + base.dowel_slip_mm}
     some = [part.name for part in prototype.parts if part.role in ("base", "stage", "frame")]
+    some += [one.name for one in prototype.bought if str(one.part).startswith(BRACKETS)]
     diameters = dict.fromkeys(some, printed) | {"plate": {*IN_PLATE_MM}}
     for name in diameters.keys() & solids.keys():  # another check says what is missing
         through = [one for one in prototype.fasteners if name in one.through]

@@ -52,7 +52,7 @@ def _hole_faults(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> 
     for name, other in HELD.items():
         if name not in solids or other not in solids:
             continue  # another check says what is missing
-        play = frame.bearing_fit_mm if other == "bearing_head" else frame.post_play_mm
+        play = frame.bearing_fit_mm if other == "bearing_head" else 0.0  # a clamp has none
         outer = max(
             (face for face in solids[name].faces if not face.hollow), key=lambda x: x.radius
         )

@@ -172,7 +172,6 @@ class FrameSpec(Strict):
 
     flange_mm: float = Field(ge=3, le=30)
     bearing_fit_mm: float = Field(ge=-0.5, le=0.5)
-    post_play_mm: float = Field(ge=0, le=2)
     camera_axis_mm: Annotated[float, Field(ge=5, le=300), OR_AUTO]
     camera_back_mm: Annotated[float, Field(ge=10, le=1000), OR_AUTO]
     camera_screw_mm: Annotated[float, Field(ge=10, le=1000), OR_AUTO]
