@@ -184,7 +184,7 @@ class PrototypeSpec(Strict):
 
     k: Annotated[int, Field(ge=1, le=1000), OR_AUTO]
     picture: Literal["moved", "fixed"]
-    caps: bool
+    caps: Literal["printed", "turned", "none"]
     max_swing_deg: float = Field(gt=0, le=360)
     ball_wall_mm: Annotated[float, Field(ge=0, le=50), OR_AUTO]
     largest_ball_mm: Annotated[float, Field(gt=0, le=1000), OR_AUTO]
