@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.core.geometry.vectors import dot, norm, unit
-from tbcad.core.optics.reflection import reflection_points
+from tbcad.core.optics.reflection import ITERATIONS, reflection_points
 from tbcad.core.optics.zernike import MONOMIALS, TERMS, term_polynomials
 from tbcad.types import Floats
 
@@ -29,7 +29,6 @@ FORM_TERMS = {
 """Orders and azimuthal numbers of the terms of a form, by their names, in their order."""
 TERM_COUNT = sum(map(len, FORM_TERMS.values()))
 LEAST_SAGITTA = 0.05  # of the designed one: a cap stays convex, however wrong it is
-ROUNDS = 8  # of the search for a point of reflection; each gains two digits or more
 STEPS = 2  # of Newton's method from the sphere, whose heights are micrometres
 POWERS = np.array(MONOMIALS).T
 POLYNOMIALS = term_polynomials()[[TERMS.index(nm) for group in FORM_TERMS.values() for nm in group]]
@@ -89,14 +88,16 @@ def power_slope(radius: Floats, half_aperture: Floats) -> Floats:
 def heights(form: Floats, offset: Floats) -> tuple[Floats, Floats]:
     """Heights (n,), mm, and gradients (n, 3) of forms (n, FORM_COLUMNS) at offsets, (n, 3)."""
     axes = form[:, FIRST:PER_MM].reshape(-1, 2, 3)
-    value, slope, _ = _polynomial(form, offset)
-    return value, np.einsum("na,nax->nx", slope, axes)
+    value, *slope = _derivatives(form, offset, (0, 0), (1, 0), (0, 1))
+    return value, np.asarray(np.einsum("an,nax->nx", slope, axes))
 
 
 def bends(form: Floats, offset: Floats) -> Floats:
     """Second derivatives of the heights, 1/mm, (n, 3, 3); arguments as of `heights`."""
     axes = form[:, FIRST:PER_MM].reshape(-1, 2, 3)
-    return np.einsum("nab,nax,nby->nxy", _polynomial(form, offset)[2], axes, axes)
+    along, mixed, across = _derivatives(form, offset, (2, 0), (1, 1), (0, 2))
+    second = np.array([[along, mixed], [mixed, across]])
+    return np.asarray(np.einsum("abn,nax,nby->nxy", second, axes, axes))
 
 
 def term_heights(form: Floats, offset: Floats) -> tuple[Floats, Floats]:
@@ -108,8 +109,8 @@ def term_heights(form: Floats, offset: Floats) -> tuple[Floats, Floats]:
     return np.stack([one for one, _ in found], axis=1), np.stack([one for _, one in found], axis=1)
 
 
-def _polynomial(form: Floats, offset: Floats) -> tuple[Floats, Floats, Floats]:
-    """Value (n,), and first (n, 2) and second (n, 2, 2) derivatives by length."""
+def _derivatives(form: Floats, offset: Floats, *orders: tuple[int, int]) -> list[Floats]:
+    """Derivatives (n,) of heights by the lengths along both axes, by their orders."""
     axes, per_mm = form[:, FIRST:PER_MM].reshape(-1, 2, 3), form[:, PER_MM]
     x, y = (per_mm[:, None] * np.einsum("nax,nx->na", axes, offset)).T[:, :, None]
     (i, j), factor = POWERS, form[:, HEIGHT:FIRST]
@@ -117,11 +118,10 @@ def _polynomial(form: Floats, offset: Floats) -> tuple[Floats, Floats, Floats]:
     def by(along: int, across: int) -> Floats:
         left, right = np.maximum(i - along, 0), np.maximum(j - across, 0)
         falling = _falling(i, along) * _falling(j, across)
-        return per_mm ** (along + across) * (factor * falling * x**left * y**right).sum(axis=1)
+        summed = (factor * falling * x**left * y**right).sum(axis=1)
+        return np.asarray(per_mm ** (along + across) * summed)
 
-    mixed = by(1, 1)
-    second = np.stack([np.stack([by(2, 0), mixed], -1), np.stack([mixed, by(0, 2)], -1)], -1)
-    return by(0, 0), np.stack([by(1, 0), by(0, 1)], axis=-1), second
+    return [by(*order) for order in orders]
 
 
 def _falling(power: np.ndarray, order: int) -> np.ndarray:
@@ -161,14 +161,19 @@ def effective_centres(
 ) -> Floats:
     """Centres (n, 3) of spheres that have point and normal of the surfaces where these reflect.
 
-    Surfaces (n,) reflect lights (n, 3) to a pinhole (3,). The sphere of the same radius that
-    touches a surface where the one before reflects is the next one.
+    Surfaces (n,) reflect lights (3,) or (n, 3) to a pinhole (3,). The search is that of
+    `tbcad.core.optics.reflection.reflection_points`; what has no form keeps its centre.
     """
-    touching = centre
-    for _ in range(ROUNDS):
-        point = reflection_points(touching, radius, light, pinhole)
-        toward = unit(point - centre)
-        height, gradient = heights(form, radius[:, None] * toward)
-        point = centre + (radius + height)[:, None] * toward
-        touching = point - radius[:, None] * unit(toward - gradient)
-    return np.asarray(touching)
+    touching, some = centre.copy(), form[:, HEIGHT:FIRST].any(axis=1)
+    middle, size, form = centre[some], radius[some, None], form[some]
+    light = np.broadcast_to(light, centre.shape)[some]
+    toward = unit(reflection_points(middle, size[:, 0], light, pinhole) - middle)
+    for _ in range(ITERATIONS):
+        height, gradient = heights(form, size * toward)
+        point, normal = middle + (size + height[:, None]) * toward, unit(toward - gradient)
+        ways = light - point, pinhole - point
+        weight = size / 2 * (1 / norm(ways[0]) + 1 / norm(ways[1]))[:, None]
+        turned = unit(unit(unit(ways[0]) + unit(ways[1])) + weight * normal)
+        toward = unit(toward + turned - normal)
+    touching[some] = point - size * normal
+    return touching

@@ -61,6 +61,7 @@ def designed_prototype(export: ExportedDesign, plan: Plan) -> Machine:
         centre=plan.centre,
         radius=plan.radius,
         leds=read_leds(export.folder),
+        forms=designed_forms(plan),
     )
 
 

@@ -21,7 +21,6 @@ from tbcad.core.optics.reflection import reflected_rays, reflection_points
 from tbcad.core.optics.sphere_forms import (
     FIRST,
     FORM_TERMS,
-    HEIGHT,
     PER_MM,
     Forms,
     effective_centres,
@@ -257,8 +256,8 @@ def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: i
     nearer = np.array([[1 / draws.focal[build]], [1 / draws.focal[build]], [1.0]])
     lens = nearer * Rotation.from_rotvec(draws.camera_tilt[build]).apply(model.axes)
     lenses = np.repeat(lens[None], len(radius), axis=0)
-    seen, made, still = centre.copy(), form[:, HEIGHT:FIRST].any(axis=1), np.zeros(3)
-    seen[made] = effective_centres(centre[made], radius[made], form[made], still, pinhole)
+    still = np.zeros(3)
+    seen = effective_centres(centre, radius, form, still, pinhole)
     shown = reflection_points(seen, radius, still, pinhole, ITERATIONS)
     return RunPose(pinhole, lenses, centre, radius, form, unit(shown - pinhole))
 
