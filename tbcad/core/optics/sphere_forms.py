@@ -168,8 +168,9 @@ def effective_centres(
     middle, size, form = centre[some], radius[some, None], form[some]
     light = np.broadcast_to(light, centre.shape)[some]
     toward = unit(reflection_points(middle, size[:, 0], light, pinhole) - middle)
+    point = middle + size * toward
     for _ in range(ITERATIONS):
-        height, gradient = heights(form, size * toward)
+        height, gradient = heights(form, point - middle)
         point, normal = middle + (size + height[:, None]) * toward, unit(toward - gradient)
         ways = light - point, pinhole - point
         weight = size / 2 * (1 / norm(ways[0]) + 1 / norm(ways[1]))[:, None]
