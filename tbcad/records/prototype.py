@@ -148,7 +148,10 @@ class CentreEstimate(RecordSection):
 
 
 class CapRecord(RecordSection):
-    """Key, limits and finish of one cap; diameters of spigot, socket and aperture."""
+    """Key, limits and finish of one cap; diameters of spigot, socket and aperture.
+
+    Of 3/A(B/C) of ISO 10110-5: A power_fringes, B irregularity_fringes, C symmetric_fringes.
+    """
 
     ball: int
     spigot_mm: Finite
@@ -159,7 +162,9 @@ class CapRecord(RecordSection):
     aperture_mm: Finite
     radius_tolerance_mm: Finite
     body_tolerance_mm: Finite
+    power_fringes: Finite
     irregularity_fringes: Finite
+    symmetric_fringes: Finite
     roughness_rq_nm: Finite
     incidence_deg: Finite
     reflectance_min: Finite

@@ -3,7 +3,7 @@
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ COLUMNS = (
 WHOLE = ("item", "quantity", "print_volume_mm3")
 NUMBERS = (*WHOLE, "mass_g", "total_mass_g", "filament_g", "print_hours", *PRICE_COLUMNS[:2])
 ALWAYS = {"FUSE-2A": 1, "GLUE-EPOXY": 1, "GRBL-BOARD": 1, "RELAY": 1, "SUPPLY-24V": 1}
-PRINT_MATERIAL, CAP_MATERIAL = "PETG", "resin"
+PRINT_MATERIAL = "PETG"
 GRAM_DECIMALS, CENTS = 2, 2
 ESTIMATE_DIGITS = 2  # of what a model says of a print, and of masses below 0.1 g
 LIGHT_G = 0.1
@@ -55,6 +55,9 @@ class PrintedItem:
     volume: float  # mm^3
     estimate: tuple[float, float]  # of its print: filament in mm^3, hours
     material: str = PRINT_MATERIAL  # of it
+    density: float | None = None  # g/cm^3; None: the printer's
+    finish: str | None = None  # that has a price of its own beside the material's
+    turned: bool = False  # made to order, not printed
 
 
 def bom_rows(
@@ -84,21 +87,12 @@ def bom_rows(
             _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
             for part, quantity in bought
         ),
-        *(_printed(item, density, prices) for item in printed),
+        *(
+            (_turned if item.turned else _printed)(item, item.density or density, prices)
+            for item in printed
+        ),
     ]
     return [{"item": item, **row} for item, row in enumerate(rows, 1)]
-
-
-def cap_item(
-    prototype: PrototypeLayout, j: int, volume: float, estimate: tuple[float, float]
-) -> PrintedItem:
-    """A cap of a volume (mm^3), by the number of its ball from 0: no two are alike."""
-    balls = prototype.balls
-    front, body = balls.radius[j], 2 * balls.body_radius[j]
-    what = (
-        f"front of radius {front:.1f} mm on a ball of {body:.3f} mm, polished and coated as drawn"
-    )
-    return PrintedItem(f"cap {j + 1}", what, volume, estimate, CAP_MATERIAL)
 
 
 def totals(rows: Iterable[Row]) -> dict[str, Any]:
@@ -153,9 +147,28 @@ def _printed(item: PrintedItem, density: float, prices: Prices) -> Row:
         "print_volume_mm3": round(item.volume),
         "filament_g": _estimate(filament),
         "print_hours": _estimate(hours),
-        **price_columns(1, prices.of(item.material, filament)),
+        **price_columns(1, _with_finish(prices.of(item.material, filament), item, prices)),
         "from": PRINTED,
     }
+
+
+def _turned(item: PrintedItem, density: float, prices: Prices) -> Row:
+    """A part made to order: its price is that of its finish."""
+    mass = item.volume / MM3_PER_CM3 * density
+    price = prices.of(str(item.finish), mass)
+    row = _row(item.name, item.what, 1, item.material, mass)
+    return {**row, **price_columns(1, price), "from": BOUGHT}
+
+
+def _with_finish(price: Price | None, item: PrintedItem, prices: Prices) -> Price | None:
+    """The price of a print with that of its finish; None where one has none."""
+    if price is None or item.finish is None:
+        return price
+    finish = prices.of(item.finish, 0.0)
+    if finish is None or finish.currency != price.currency:
+        return None
+    source = f"{price.source}; {finish.source}"
+    return replace(price, amount=price.amount + finish.amount, source=source)
 
 
 def ball_rows(prototype: PrototypeLayout, prices: Prices) -> Iterator[Row]:

@@ -29,7 +29,7 @@ from tbcad.core.spec.design import Spec
 from tbcad.prototype.arrangement import PrototypeModel, arrangements
 from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.prototype.assembly_steps.steps import mounting_record
-from tbcad.prototype.base.caps import cap_limits, cap_sheet
+from tbcad.prototype.base.caps import cap_item, cap_limits, cap_sheet
 from tbcad.prototype.drive.drive import base_torques, drive_loads
 from tbcad.prototype.electronics import Wiring
 from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
@@ -121,7 +121,7 @@ def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: P
     """Rows of the parts list; estimates are of the printed parts, in their order."""
     layout, density = built.layout, built.spec.printer.density_g_cm3
     printed = [
-        bom.cap_item(layout, part.ball, part.solid.volume, estimate)
+        cap_item(layout, part.ball, part.solid.volume, estimate)
         if part.role == "cap"
         else bom.PrintedItem(part.name, part.what, part.solid.volume, estimate)
         for part, estimate in zip(built.printed, estimates, strict=True)

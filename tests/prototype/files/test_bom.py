@@ -7,8 +7,9 @@ import pytest
 
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.base.caps import cap_item
 from tbcad.prototype.drive.drive import load_drives
-from tbcad.prototype.files.bom import PrintedItem, bom_rows, cap_item
+from tbcad.prototype.files.bom import PrintedItem, bom_rows
 from tbcad.prototype.purchased.parts import load_parts, load_prices
 
 PARTS = load_parts()
