@@ -323,7 +323,7 @@ class PrototypeSpec(Section):
     """What happens to a ball's picture when pictures are merged. moved: it is moved to its
     mirror's place; fixed: it stays, and balls must then be so small that few pixels remain,
     unless k is very large."""
-    caps: Annotated[CapMaking, BeforeValidator(_cap_making)] = "printed"
+    caps: Annotated[CapMaking, BeforeValidator(_cap_making)] = "turned"
     """How groups that need more than the largest ball get caps of their own radius, in the same
     seat. printed: in resin, polished by hand and coated; turned: in aluminium, with a diamond;
     none: they get the largest ball."""
