@@ -15,7 +15,7 @@ import numpy as np
 
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.reflection import ITERATIONS, reflection_points
-from tbcad.core.optics.zernike import MONOMIALS, TERMS, term_polynomials
+from tbcad.core.optics.zernike import DEGREE, MONOMIALS, TERMS, term_polynomials
 from tbcad.types import Floats
 
 # Columns of a form.
@@ -29,6 +29,7 @@ FORM_TERMS = {
 """Orders and azimuthal numbers of the terms of a form, by their names, in their order."""
 TERM_COUNT = sum(map(len, FORM_TERMS.values()))
 LEAST_SAGITTA = 0.05  # of the designed one: a cap stays convex, however wrong it is
+CONVERGED = 1e-14  # radians, of the normal
 STEPS = 2  # of Newton's method from the sphere, whose heights are micrometres
 POWERS = np.array(MONOMIALS).T
 POLYNOMIALS = term_polynomials()[[TERMS.index(nm) for group in FORM_TERMS.values() for nm in group]]
@@ -112,13 +113,14 @@ def term_heights(form: Floats, offset: Floats) -> tuple[Floats, Floats]:
 def _derivatives(form: Floats, offset: Floats, *orders: tuple[int, int]) -> list[Floats]:
     """Derivatives (n,) of heights by the lengths along both axes, by their orders."""
     axes, per_mm = form[:, FIRST:PER_MM].reshape(-1, 2, 3), form[:, PER_MM]
-    x, y = (per_mm[:, None] * np.einsum("nax,nx->na", axes, offset)).T[:, :, None]
+    place = per_mm[:, None] * np.einsum("nax,nx->na", axes, offset)
+    x, y = np.cumprod([np.ones_like(place), *[place] * DEGREE], axis=0).transpose(2, 1, 0)
     (i, j), factor = POWERS, form[:, HEIGHT:FIRST]
 
     def by(along: int, across: int) -> Floats:
         left, right = np.maximum(i - along, 0), np.maximum(j - across, 0)
         falling = _falling(i, along) * _falling(j, across)
-        summed = (factor * falling * x**left * y**right).sum(axis=1)
+        summed = np.einsum("nk,k,nk,nk->n", factor, falling, x[:, left], y[:, right])
         return np.asarray(per_mm ** (along + across) * summed)
 
     return [by(*order) for order in orders]
@@ -176,5 +178,7 @@ def effective_centres(
         weight = size / 2 * (1 / norm(ways[0]) + 1 / norm(ways[1]))[:, None]
         turned = unit(unit(unit(ways[0]) + unit(ways[1])) + weight * normal)
         toward = unit(toward + turned - normal)
+        if np.abs(turned - normal).max(initial=0) < CONVERGED:
+            break
     touching[some] = point - size * normal
     return touching
