@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tbcad.core.spec.design import spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.caps import cap_item
@@ -34,7 +35,7 @@ def test_figures_are_rounded_and_equal_balls_share_a_row(layout: PrototypeLayout
     assert told == (500000, 530.0, 41.0)
     assert foot["print_hours"] == 0.083
     rows = bom_rows(layout, DRIVES[0], {"MAGNET-4x3": 2}, printed, 1.27, PARTS, PRICES)
-    assert [row["material"] for row in rows[-len(caps) :]] == ["resin"] * len(caps)
+    assert [row["material"] for row in rows[-len(caps) :]] == ["aluminium EN AW-6061"] * len(caps)
     for row in rows:
         assert round(row["mass_g"], 2) == row["mass_g"] or row["mass_g"] < 0.1
 
@@ -42,3 +43,21 @@ def test_figures_are_rounded_and_equal_balls_share_a_row(layout: PrototypeLayout
 def test_unknown_part(layout: PrototypeLayout) -> None:
     with pytest.raises(SpecError, match="'M3x11' is in no list of purchased parts"):
         bom_rows(layout, DRIVES[0], {"M3x11": 1}, (), 1.27, PARTS, PRICES)
+
+
+@pytest.mark.parametrize(
+    ("caps", "mass", "price", "source"),
+    [("printed", 2.36, 60.05, "printed"), ("turned", 5.4, 180, "bought")],
+)
+def test_a_cap_has_the_mass_of_its_material_and_the_price_of_its_finish(
+    layout: PrototypeLayout, caps: str, mass: float, price: float, source: str
+) -> None:
+    """Of 2 cm^3; 1 cm^3 of resin goes into the print."""
+    spec = spec_with(layout.spec, prototype={"caps": caps})
+    item = cap_item(
+        replace(layout, spec=spec), int(np.flatnonzero(layout.balls.cap)[0]), 2e3, (1e3, 0.2)
+    )
+    (row,) = bom_rows(layout, DRIVES[0], {}, [item], 1.27, PARTS, PRICES)[-1:]
+    assert row["mass_g"] == pytest.approx(mass)
+    assert row["unit_price"] == pytest.approx(price, abs=0.01)
+    assert row["from"] == source
