@@ -67,7 +67,7 @@ def prototype_document(**changes: Any) -> Record:
                 "mass_g": 1.0,
                 "bought_price": {},
                 "without_price": 0,
-                "work_price": {},
+                "tools_price": {},
                 "parts_printed": 0,
             },
             **{"filament_g": 1.0, "filament_price": {}, "print_hours": 1.0},

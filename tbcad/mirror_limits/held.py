@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.zernike import TERMS
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.mirror_limits.sensitivity import MM_PER_UM, SMALLEST_LIMIT, MirrorLimits
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, simulate, tolerable_factor
 from tbcad.tolerancing.montecarlo.edge_model import cell_radii, edge_models
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.montecarlo.form import TERMS, term_shares
+from tbcad.tolerancing.montecarlo.form import term_shares
 from tbcad.tolerancing.process.chain import ChainStep
 from tbcad.tolerancing.process.process import Process, process_errors
 from tbcad.types import Floats, Ints

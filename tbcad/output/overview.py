@@ -15,6 +15,7 @@ from tbcad.core.spec.design import MeshSpec, Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL
 from tbcad.prototype.arrangement import PrototypeModel, arrange
+from tbcad.prototype.drive.balance import ball_masses, cap_volume
 from tbcad.prototype.files.bom import PRINT_MATERIAL, ball_rows, by_currency
 from tbcad.prototype.purchased.parts import load_prices
 from tbcad.shell.files import camera_a_mesh, design_mandrel
@@ -131,12 +132,14 @@ def _prototype(arrangement: PrototypeModel) -> PrototypeOverview:
 
 def _printed_volume(arrangement: PrototypeModel) -> float:
     """Volume of carrier, caps, stage and frame, mm^3."""
-    density = arrangement.spec.printer.density_g_cm3
-    turning = arrangement.balance.mass_g - arrangement.layout.mass_g
+    spec, layout = arrangement.spec, arrangement.layout
+    turning = arrangement.balance.mass_g - float(ball_masses(layout).mass_g.sum())
+    caps = float(cap_volume(layout.balls).sum()) if spec.prototype.caps == "printed" else 0.0
     static = (*arrangement.stage.components, *arrangement.frame.printed)
     # As if the bodies of a component did not overlap.
     solid = (sum(map(volume, one.added)) - sum(map(volume, one.removed)) for one in static)
-    return turning / density * MM3_PER_CM3 + sum(max(one, 0.0) for one in solid)
+    carrier = turning / spec.printer.density_g_cm3 * MM3_PER_CM3
+    return carrier + caps + sum(max(one, 0.0) for one in solid)
 
 
 def _print_estimate(volume_mm3: float, spec: Spec) -> PrintEstimate:

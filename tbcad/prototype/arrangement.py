@@ -127,7 +127,7 @@ def balance_and_drive(
 
     SpecError: no drive is strong enough, or no brake holds the base without power.
     """
-    balance = sum_masses(base.frame, ball_masses(layout, spec.printer.density_g_cm3), carrier)
+    balance = sum_masses(base.frame, ball_masses(layout), carrier)
     torques = base_torques(balance, layout.stops.range, spec.prototype.motion)
     drive = choose_drive(spec.prototype.base.drive, torques, load_drives(parts))
     travel = travel_ends(layout, spec.prototype.motion)

@@ -37,6 +37,27 @@ class SphereRecord(RecordSection):
     radius_mm: Length
 
 
+TermsUm = Annotated[tuple[Finite, ...], Field(min_length=7, max_length=7)]
+
+
+class FormRecord(RecordSection):
+    """Form error of a cap's front, besides its radius, with the base at angle zero.
+
+    Attributes:
+        ball: of the cap, from 1.
+        half_aperture_mm: radius of the disc about the apex.
+        axes: two unit vectors across the apex's normal, at right angles; a third is the normal.
+        terms_um: Zernike terms over the disc, each its root mean square along the normal:
+            astigmatism along and between the axes (45 degrees, 0), coma (second, first axis),
+            trefoil (sine, cosine), spherical aberration.
+    """
+
+    ball: int = Field(ge=1)
+    half_aperture_mm: Length
+    axes: tuple[Vector, Vector]
+    terms_um: TermsUm
+
+
 class MachineRecord(Document):
     """machine.json.
 
@@ -48,6 +69,7 @@ class MachineRecord(Document):
         shift_mm: of the base; None: none.
         sag_mm: of each sphere by its weight, in the base's frame.
         leds_mm: places that the LEDs shine from.
+        forms: of the fronts of caps; None: all are spheres.
     """
 
     MISSING: ClassVar[str] = "name a folder that tbcad calibrate wrote"
@@ -62,6 +84,7 @@ class MachineRecord(Document):
     turn_rad: tuple[Vector, ...] | None = None
     shift_mm: tuple[Vector, ...] | None = None
     sag_mm: tuple[tuple[Vector, ...], ...] | None = None
+    forms: tuple[FormRecord, ...] | None = None
 
     @model_validator(mode="after")
     def _of_each_frame(self) -> Self:
@@ -71,6 +94,8 @@ class MachineRecord(Document):
                 raise ValueError(f"another number of {what} than frames")
         if any(len(row) != len(self.spheres) for row in self.sag_mm or ()):
             raise ValueError("another number of sags than spheres in a frame")
+        if any(one.ball > len(self.spheres) for one in self.forms or ()):
+            raise ValueError("a form of a sphere that is not there")
         return self
 
 

@@ -148,7 +148,10 @@ class CentreEstimate(RecordSection):
 
 
 class CapRecord(RecordSection):
-    """Key, limits and finish of one cap; diameters of spigot, socket and aperture."""
+    """Key, limits and finish of one cap; diameters of spigot, socket and aperture.
+
+    Of 3/A(B/C) of ISO 10110-5: A power_fringes, B irregularity_fringes, C symmetric_fringes.
+    """
 
     ball: int
     spigot_mm: Finite
@@ -159,7 +162,9 @@ class CapRecord(RecordSection):
     aperture_mm: Finite
     radius_tolerance_mm: Finite
     body_tolerance_mm: Finite
+    power_fringes: Finite
     irregularity_fringes: Finite
+    symmetric_fringes: Finite
     roughness_rq_nm: Finite
     incidence_deg: Finite
     reflectance_min: Finite
@@ -280,14 +285,14 @@ class ListTotals(RecordSection):
     Attributes:
         mass_g: of all parts, printed ones as solids.
         without_price: kinds of parts that are bought and have none.
-        work_price: of the finish of caps, and of tools.
+        tools_price: of tools, which are no parts.
         parts_printed: parts of the machine that are printed, without tools.
     """
 
     mass_g: Finite
     bought_price: dict[str, Finite]
     without_price: int
-    work_price: dict[str, Finite]
+    tools_price: dict[str, Finite]
     parts_printed: int
     filament_g: Finite
     filament_price: dict[str, Finite]

@@ -20,7 +20,7 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, read_plan
 from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.records.tables import RayRow
-from tbcad.rig.machine.designed import machine_runs, stops_known
+from tbcad.rig.machine.designed import is_cap, machine_runs, stops_known
 from tbcad.rig.machine.machine import RECORD, Machine, read_machine
 from tbcad.types import Floats
 
@@ -68,8 +68,11 @@ class Deviations:
 
 
 def deviations(machine: Machine, plan: Plan) -> Deviations:
-    """Compare a calibrated machine with its plan, which has as many balls."""
-    designed, found = plan.centre, machine.centre
+    """Compare a calibrated machine with its plan, which has as many balls.
+
+    Caps are compared by their apices, about which their radii differ.
+    """
+    designed, found = plan.centre, machine.centre + _growth(machine, plan)
     turn, shift = Rotation.identity(), np.zeros(3)
     if len(designed) >= LEAST_BALLS:
         middles = designed.mean(axis=0), found.mean(axis=0)
@@ -77,6 +80,12 @@ def deviations(machine: Machine, plan: Plan) -> Deviations:
         shift = middles[1] - turn.apply(middles[0])
     offset = found - turn.apply(designed) - shift
     return Deviations(offset, machine.radius - plan.radius, shift, turn.as_rotvec())
+
+
+def _growth(machine: Machine, plan: Plan) -> Floats:
+    """By how much centres of caps are farther from their apices than in the plan, mm, (k, 3)."""
+    growth = np.where(is_cap(plan), machine.radius - plan.radius, 0.0)
+    return np.asarray(growth[:, None] * plan.normal)
 
 
 def round_up(value: float) -> float:
@@ -94,13 +103,13 @@ def colours(share: Floats) -> Floats:
 def ball_group(machine: Machine, plan: Plan, found: Deviations) -> SolidGroup:
     """All balls at base angle zero; a cap is what its reflecting sphere and its body share."""
     shades = colours(found.distance_um / found.scale_um).tolist()
-    bodies = []
+    bodies, fronts = [], machine.centre + _growth(machine, plan)
     for k, (red, green, blue) in enumerate(shades):
         name = f"ball_{k + 1}"
         shape = sphere(machine.centre[k], float(machine.radius[k]))
         apart = abs(plan.centre[k] - plan.body_centre[k]).max()
         if max(apart, abs(plan.radius[k] - plan.body_radius[k])) > SAME_MM:
-            body = machine.centre[k] + plan.body_centre[k] - plan.centre[k]
+            body = fronts[k] + plan.body_centre[k] - plan.centre[k]
             cap = common(shape, sphere(body, float(plan.body_radius[k])))
             shape = one_solid(name, cap)
         bodies.append(ColouredSolid(name, shape, (red, green, blue, 1.0)))

@@ -149,7 +149,8 @@ class _Simulator:
 
     def errors_of(self, process: Process) -> Errors:
         """Errors of a process, but for the coating that the design allows for."""
-        return process_errors(process, self.export.spec.mirrors.coating_um)
+        spec = self.export.spec
+        return process_errors(process, spec.mirrors.coating_um, spec.prototype.caps)
 
     def all_builds(self, case: Case[AnyResult]) -> AnyResult:
         """Result of as many builds as asked for."""

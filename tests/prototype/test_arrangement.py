@@ -79,7 +79,7 @@ class TestMass:
         printer = small.spec.printer
         solids = carrier_parts(small.base, small.split, printer, 0.1)
         exact = sum(part.mass_g(printer.density_g_cm3) for part in solids)
-        carried = ball_masses(small.layout, printer.density_g_cm3).mass_g.sum()
+        carried = ball_masses(small.layout).mass_g.sum()
         assert small.balance.mass_g - carried == pytest.approx(exact, rel=0.15)
 
 

@@ -71,9 +71,10 @@ def simulate_run(options: SimulateRunOptions) -> Run:
     from tbcad.tolerancing.process.process import load_process, process_errors
 
     check_is_free(folder, (exports, file, *files_named(options.process)))
-    errors = process_errors(load_process(options.process))
+    process = load_process(options.process)
     options.progress("build and object")
     export = read_export(exports)
+    errors = process_errors(process, caps=export.spec.prototype.caps)
     taken = ObjectOptions(up=options.up, unit=options.unit)
     subject = run_object(export, file, taken, options.answer)
     runs, phases = prepare_run(export, errors, subject, options)

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from tbcad.core.spec.prototype import PrototypeSpec
+from tbcad.core.spec.prototype import CapMaking, PrototypeSpec
 from tbcad.core.spec.section import OrWord, Section, as_tuple, whole
 from tbcad.core.spec.sizes import OpticsSpec, with_sizes
 
@@ -25,6 +25,8 @@ RadiusRule: TypeAlias = Literal["traced", "paper", "flat"]
 MAX_MARGIN = 20.0
 MAX_MIRRORS = 50_000  # of one camera: more than n = 60 has
 Margin: TypeAlias = Annotated[float, Field(ge=0, le=MAX_MARGIN)]
+# Cured standard resins 1.15 to 1.2 g/cm^3 (data sheets); EN AW-6061 2.70 (EN 573-3).
+CAP_DENSITIES: dict[CapMaking, float] = {"printed": 1.18, "turned": 2.70, "none": 0.0}
 
 
 class PrinterSpec(Section):
@@ -183,6 +185,11 @@ class Spec(Section):
     step: StepSpec = StepSpec()
     printer: PrinterSpec = PrinterSpec()
     prototype: PrototypeSpec = PrototypeSpec()
+
+    @property
+    def cap_density_g_cm3(self) -> float:
+        """Density of what caps are made of."""
+        return CAP_DENSITIES[self.prototype.caps]
 
     def __repr__(self) -> str:
         return f"<Spec {self.name!r}: n = {self.optics.n}>"

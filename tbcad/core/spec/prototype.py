@@ -15,6 +15,7 @@ GradeName: TypeAlias = Literal[
 ]
 Snap: TypeAlias = Literal["cover", "nearest"]
 Picture: TypeAlias = Literal["moved", "fixed"]
+CapMaking: TypeAlias = Literal["printed", "turned", "none"]
 Drive: TypeAlias = Literal["nema17-belt", "nema17-direct", "stage-60"]
 Hold: TypeAlias = Literal["magnet", "glue"]
 Firmware: TypeAlias = Literal["grblhal", "grbl", "klipper"]
@@ -50,6 +51,11 @@ def _places(value: object) -> object:
         f"{short_text(value)} is not allowed: give {LEAST_LEDS} to {MOST_LEDS} places [x, y, z], "
         "or [] for a stage without"
     )
+
+
+def _cap_making(value: object) -> object:
+    """Words as they are; true and false of designs before there were words."""
+    return {True: "printed", False: "none"}[value] if isinstance(value, bool) else value
 
 
 Places: TypeAlias = Annotated[tuple[_Place, ...], BeforeValidator(_places)]
@@ -320,9 +326,10 @@ class PrototypeSpec(Section):
     """What happens to a ball's picture when pictures are merged. moved: it is moved to its
     mirror's place; fixed: it stays, and balls must then be so small that few pixels remain,
     unless k is very large."""
-    caps: bool = True
-    """Give groups that need more than the largest ball a printed or turned cap of their own
-    radius, in the same seat; false: they get the largest ball."""
+    caps: Annotated[CapMaking, BeforeValidator(_cap_making)] = "turned"
+    """How groups that need more than the largest ball get caps of their own radius, in the same
+    seat. printed: in resin, polished by hand and coated; turned: in aluminium, with a diamond;
+    none: they get the largest ball."""
     cap_rim_mm: float = Field(2.0, ge=0, le=50)
     """Width of the rim round the part of a cap in use."""
     ball_wall_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=0, le=50)

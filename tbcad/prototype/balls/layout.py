@@ -47,7 +47,7 @@ from tbcad.types import Floats, Ints
 SELECTION_RULES: dict[str, dict[str, Any]] = {
     f"{snap}, {name}": {"snap": snap, "caps": caps}
     for snap in ("cover", "nearest")
-    for name, caps in (("with caps", True), ("balls only", False))
+    for name, caps in (("with caps", "printed"), ("balls only", "none"))
 }
 
 

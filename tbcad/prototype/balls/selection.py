@@ -215,7 +215,7 @@ def ball_candidates(
 def choose_balls(candidates: BallCandidates, spec: PrototypeSpec, catalogue: Catalogue) -> Balls:
     """The ball of each group, by the spec's rule; groups beyond stock get caps if it says so."""
     if spec.snap == "nearest":
-        radius, stock = _nearest(candidates.groups.radius, catalogue, spec.caps)
+        radius, stock = _nearest(candidates.groups.radius, catalogue, spec.caps != "none")
     else:
         radius, stock = _covering(candidates, spec, catalogue)
     return balls_with_radii(candidates, radius, stock, catalogue, spec.cap_rim_mm)
@@ -277,7 +277,7 @@ def _covering(
     all_ignored = groups.minimum(ignored.astype(float)) == 1
     stock = np.where(all_ignored, _nearest(groups.radius, catalogue, False)[1], stock)
     radius = catalogue.diameter[stock] / 2
-    beyond = ~all_ignored & spec.caps & (stock == last)
+    beyond = ~all_ignored & (spec.caps != "none") & (stock == last)
     if not beyond.any():
         return radius, stock
     steps = _largest_cap(candidates.only(beyond[groups.group_of]), radius, ignored, moved)

@@ -41,6 +41,7 @@ from tbcad.prototype.base.holding import (
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.balance import ball_masses
 from tbcad.prototype.fasteners import Fastener
+from tbcad.prototype.files.bom import PrintedItem
 from tbcad.prototype.part import Part
 from tbcad.prototype.purchased.parts import Parts
 from tbcad.records.prototype import CapRecord, HeldBall, Holding
@@ -53,8 +54,21 @@ SHARES = 4  # of the margin: radius, figure, tilt, seat
 MIN_MARGIN_MM = 0.3
 FRINGE_MM = 546.07e-6 / 2  # ISO 10110-5: half a wavelength of the green mercury line
 MIN_REFLECTANCE = 0.55  # of polished steel, as the balls: without what roughness scatters
-MATERIAL = "resin"
-FINISH = "polished and coated with aluminium as its drawing asks"
+MATERIALS = {"printed": "resin", "turned": "aluminium EN AW-6061"}
+FINISHES = {
+    "printed": "polished and coated with aluminium as its drawing asks",
+    "turned": "turned with a diamond as its drawing asks",
+}
+MATERIAL_TEXTS = {
+    "resin": ("SLA resin, lacquered before it is coated with aluminium",),
+    "aluminium EN AW-6061": (
+        "EN AW-6061, of fine grain (RSA-6061) where Rq asks for it;",
+        "front turned with a diamond, bare",
+    ),
+}
+# Slope of Zernike's spherical aberration at the rim over that of a power, both from peak to valley:
+# 8 against 2, over the half aperture.
+SYMMETRIC = 2 / 8
 # Of the optical drawing, on paper.
 VIEW_MM = 95.0, 95.0  # room of the section on paper
 MIDDLE_MM = 80.0, 128.0  # of the body's centre on paper
@@ -121,6 +135,23 @@ def cap_limits(spec: Spec, base: BaseLayout, prototype: PrototypeLayout) -> tupl
     return tuple(_limits(spec, base, prototype, k) for k in caps)
 
 
+def cap_item(
+    prototype: PrototypeLayout, j: int, volume: float, estimate: tuple[float, float]
+) -> PrintedItem:
+    """A cap of a volume (mm^3), by the number of its ball from 0: no two are alike."""
+    balls, spec = prototype.balls, prototype.spec
+    front, body = balls.radius[j], 2 * balls.body_radius[j]
+    making = spec.prototype.caps
+    finish = FINISHES[making]
+    what = f"front of radius {front:.1f} mm on a ball of {body:.3f} mm, {finish}"
+    return PrintedItem(
+        *(f"cap {j + 1}", what, volume, estimate, MATERIALS[making]),
+        density=spec.cap_density_g_cm3,
+        finish=f"finish of a {making} cap",
+        turned=making == "turned",
+    )
+
+
 def cap_edge(prototype: PrototypeLayout, k: int) -> float:
     """Radius of the circle in which a cap's front and body meet, mm."""
     balls = prototype.balls
@@ -133,7 +164,8 @@ def _limits(spec: Spec, base: BaseLayout, prototype: PrototypeLayout, k: int) ->
     used = cap_edge(prototype, k) - spec.prototype.cap_rim_mm
     distance = float(norm(apex))
     share = max(spec.mirrors.margin_mm, MIN_MARGIN_MM) / np.sqrt(SHARES)
-    slope = share / (4 * distance)
+    slope, making = share / (4 * distance), spec.prototype.caps
+    fringes = slope * used / 2 / FRINGE_MM
     (spigot, end), tilt = cap_spigot(base, k), cap_tilt(base, k)
     to_camera = prototype.array.camera.pinhole - apex
     # Object and pinhole are seen from an apex at the same angle from its normal.
@@ -149,12 +181,14 @@ def _limits(spec: Spec, base: BaseLayout, prototype: PrototypeLayout, k: int) ->
         aperture_mm=2 * used,
         radius_tolerance_mm=slope * radius**2 / used,
         body_tolerance_mm=2 * (slope * radius * float(np.cos(base.seats.tilt))),
-        irregularity_fringes=slope * used / 2 / FRINGE_MM,
+        power_fringes=fringes,
+        irregularity_fringes=fringes,
+        symmetric_fringes=SYMMETRIC * fringes,
         roughness_rq_nm=roughness_nm(),
         incidence_deg=float(np.degrees(np.arccos(between))) / 2,
         reflectance_min=MIN_REFLECTANCE,
-        material=MATERIAL,
-        finish=FINISH,
+        material=MATERIALS[making],
+        finish=FINISHES[making],
         polarity=POLARITY,
         pdf=f"{drawing}.pdf",
         dxf=f"{drawing}.dxf",
@@ -164,7 +198,7 @@ def _limits(spec: Spec, base: BaseLayout, prototype: PrototypeLayout, k: int) ->
 def holding(base: BaseLayout, prototype: PrototypeLayout, parts: Parts) -> Holding:
     """What holds each ball in its seat, with the pads as they are turned, and assumptions."""
     seats, motion = base.seats, base_motion(prototype.spec)
-    masses = ball_masses(prototype, motion.cap_density)
+    masses = ball_masses(prototype)
     needed = force_needed(
         seats.pad_normals, seats.axis, seats.centre, masses.mass_g, base.frame, motion
     ).tolist()
@@ -210,13 +244,15 @@ def _forces(base: BaseLayout, prototype: PrototypeLayout, k: int) -> tuple[float
 
 @planned("Make the caps", "cap_*")
 def caps_step(machine: AssembledMachine) -> Words:
-    """Mirrors that are printed or turned."""
+    """Mirrors that are made."""
     caps = machine.record.caps
     return told_words(
         __name__,
         "caps",
         drawings=", ".join(str(one.pdf) for one in caps),
         ask="asks" if len(caps) == 1 else "ask",
+        printed=caps[0].material == MATERIALS["printed"],
+        turned=caps[0].material == MATERIALS["turned"],
         caps=[{"cap": one} for one in caps],
     )
 
@@ -327,9 +363,10 @@ def _blocks(one: CapRecord, radius: float, diameter: float) -> tuple[tuple[str, 
     finish, scattered = one.roughness_rq_nm, scattered_share(one.roughness_rq_nm)
     front = (
         "Front",
-        f"R {radius:.1f} +-{one.radius_tolerance_mm:.2f} CX",
+        f"R {radius:.1f} CX, within +-{one.radius_tolerance_mm:.2f} by 3/",
         f"effective diameter {one.aperture_mm:.1f}",
-        f"3/ -({one.irregularity_fringes:.1f}), fringes of 546 nm over it",
+        f"3/ {one.power_fringes:.1f}({one.irregularity_fringes:.1f}/{one.symmetric_fringes:.1f}), "
+        "fringes of 546 nm over it (ISO 10110-5)",
         f"4/ centre of R within {one.centre_shift_mm:.2f} of the spigot's axis",
         f"Rq {finish:.1f} nm or better: scatters {scattered:.0%} at 550 nm",
         f"coat: reflects {one.reflectance_min:.0%} or more unscattered, 400 to 700 nm at "
@@ -337,8 +374,7 @@ def _blocks(one: CapRecord, radius: float, diameter: float) -> tuple[tuple[str, 
     )
     material = (
         "Material",
-        "SLA resin, lacquered before it is coated with aluminium,",
-        "or aluminium EN AW-6082, turned and polished",
+        *MATERIAL_TEXTS[one.material],
         "magnet in the spigot: north pole toward the front",
     )
     body = (

@@ -98,18 +98,17 @@ def pull_of_pair(one: float, two: float, gap: float, heights: tuple[float, float
 
 @dataclass(frozen=True)
 class Motion:
-    """How the base moves, and what caps weigh."""
+    """How the base moves."""
 
     speed: float  # radians/s
     acceleration: float  # radians/s^2
-    cap_density: float  # g/cm^3
 
 
 def base_motion(spec: Spec) -> Motion:
     """The motion that a design asks for."""
     motion = spec.prototype.motion
     speed, acceleration = np.radians([motion.feed_deg_min / 60, motion.acceleration_deg_s2])
-    return Motion(float(speed), float(acceleration), spec.printer.density_g_cm3)
+    return Motion(float(speed), float(acceleration))
 
 
 def force_needed(
@@ -195,7 +194,7 @@ def magnet_pockets(
 def worst_force_needed(prototype: PrototypeLayout, axes: Floats, tilt: float) -> Floats:
     """Force that each ball needs with its pads at their worst azimuth, N, (k,)."""
     motion = base_motion(prototype.spec)
-    masses = ball_masses(prototype, motion.cap_density)
+    masses = ball_masses(prototype)
     turned = [np.full(len(masses), one) for one in PAD_AZIMUTHS.tolist()]
     normals = np.stack([pad_normals(tilt, azimuth) @ axes for azimuth in turned])
     frame = prototype.array.ellipsoid.frame()

@@ -109,14 +109,14 @@ def sum_masses(frame: Floats, *loads: PointMasses) -> BaseBalance:
     return BaseBalance(frame, float(mass.sum()), first_moment, inertia)
 
 
-def ball_masses(prototype: PrototypeLayout, cap_density: float) -> PointMasses:
-    """All balls and caps in their places; cap_density in g/cm^3.
+def ball_masses(prototype: PrototypeLayout) -> PointMasses:
+    """All balls and caps in their places.
 
     The mass of a cap counts at the centre of its body's sphere, which is at most a few millimetres
     from its centre of gravity.
     """
     volume = cap_volume(prototype.balls)
-    mass = prototype.balls.mass_g + volume * cap_density * 1e-3
+    mass = prototype.balls.mass_g + volume * prototype.spec.cap_density_g_cm3 * 1e-3
     return PointMasses(mass, prototype.body_centres())
 
 

@@ -3,7 +3,7 @@
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
@@ -32,13 +32,13 @@ NUMBERS = (*WHOLE, "mass_g", "total_mass_g", "filament_g", "print_hours", *PRICE
 ALWAYS = {"DRIVER-TMC5160": 1, "FUSE-2A": 1, "GLUE-EPOXY": 1, "SUPPLY-24V": 1}
 # Magnetic and hardened, so that magnets hold it and it polishes; AISI 52100. 316 is not magnetic.
 BALL_STEEL = "100Cr6"
-PRINT_MATERIAL, CAP_MATERIAL = "PETG", "resin"
+PRINT_MATERIAL = "PETG"
 GRAM_DECIMALS, CENTS = 2, 2
 ESTIMATE_DIGITS = 2  # of what a model says of a print, and of masses below 0.1 g
 LIGHT_G = 0.1
 KINDS = BOUGHT, PRINTED = "bought", "printed"
-WORK = SERVICE, TOOL = "service", "tool"  # rows that are no parts of the machine
-WORK_LIST, CAP_FINISH = "work.csv", "CAP-FINISH"
+TOOL = "tool"  # of rows that are no parts of the machine
+TOOL_LIST = "tools.csv"
 TOOL_MARK = "tool: "  # of what is printed to assemble the others
 MM3_PER_CM3 = 1000.0
 SHOWN = 6  # rows without --full
@@ -62,6 +62,9 @@ class PrintedItem:
     estimate: tuple[float, float]  # of its print: filament in mm^3, hours
     material: str = PRINT_MATERIAL  # of it
     tool: bool = False  # whether it is no part of the machine
+    density: float | None = None  # g/cm^3; None: the printer's
+    finish: str | None = None  # that has a price of its own beside the material's
+    turned: bool = False  # made to order, not printed
 
 
 def bom_rows(
@@ -91,50 +94,34 @@ def bom_rows(
             _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
             for part, quantity in bought
         ),
-        *(_printed(item, density, prices) for item in printed),
+        *(
+            (_turned if item.turned else _printed)(item, item.density or density, prices)
+            for item in printed
+        ),
     ]
     return [{"item": item, **row} for item, row in enumerate(rows, 1)]
 
 
-def work_rows(prototype: PrototypeLayout, first: int, prices: Prices) -> list[Row]:
-    """What else is to pay for, items numbered from a first: finish of caps, and tools.
-
-    The plate and the wheel are drilled with these.
-    """
-    file = files("tbcad.prototype.files") / WORK_LIST
-    counts = {CAP_FINISH: int(prototype.balls.cap.sum())}
+def tool_rows(first: int, prices: Prices) -> list[Row]:
+    """Tools to pay for, items numbered from a first; plate and wheel are drilled with these."""
+    file = files("tbcad.prototype.files") / TOOL_LIST
     rows: list[Row] = []
-    for _, cells in read_rows(file, WORK_LIST, ("part", "what", "from")):
-        part, quantity = cells["part"], counts.get(cells["part"], 1)
-        row = dict.fromkeys(COLUMNS) | {**cells, "quantity": quantity, "standard": ""}
-        priced = price_columns(quantity, prices.of(part, 0.0))
-        if quantity:
-            rows.append({**row, **priced, "item": first + len(rows), "material": ""})
+    for item, (_, cells) in enumerate(read_rows(file, TOOL_LIST, ("part", "what", "from")), first):
+        row = dict.fromkeys(COLUMNS) | {**cells, "quantity": 1, "standard": "", "material": ""}
+        rows.append({**row, **price_columns(1, prices.of(cells["part"], 0.0)), "item": item})
     return rows
-
-
-def cap_item(
-    prototype: PrototypeLayout, j: int, volume: float, estimate: tuple[float, float]
-) -> PrintedItem:
-    """A cap of a volume (mm^3), by the number of its ball from 0: no two are alike."""
-    balls = prototype.balls
-    front, body = balls.radius[j], 2 * balls.body_radius[j]
-    what = (
-        f"front of radius {front:.1f} mm on a ball of {body:.3f} mm, polished and coated as drawn"
-    )
-    return PrintedItem(f"cap {j + 1}", what, volume, estimate, CAP_MATERIAL)
 
 
 def totals(rows: Iterable[Row]) -> dict[str, Any]:
     """Sums of a list, for prototype.json; prices by currency, of parts that have one."""
     rows = list(rows)
     bought, printed = ([row for row in rows if row["from"] == kind] for kind in KINDS)
-    work = [row for row in rows if row["from"] in WORK]
+    tools = [row for row in rows if row["from"] == TOOL]
     return {
         "mass_g": _sum(rows, "total_mass_g"),
         "bought_price": by_currency(bought),
         "without_price": sum(row["unit_price"] is None for row in bought),
-        "work_price": by_currency(work),
+        "tools_price": by_currency(tools),
         "parts_printed": sum(not is_tool(row) for row in printed),
         "filament_g": _sum(printed, "filament_g"),
         "filament_price": by_currency(printed),
@@ -185,9 +172,28 @@ def _printed(item: PrintedItem, density: float, prices: Prices) -> Row:
         "print_volume_mm3": round(item.volume),
         "filament_g": _estimate(filament),
         "print_hours": _estimate(hours),
-        **price_columns(1, prices.of(item.material, filament)),
+        **price_columns(1, _with_finish(prices.of(item.material, filament), item, prices)),
         "from": PRINTED,
     }
+
+
+def _turned(item: PrintedItem, density: float, prices: Prices) -> Row:
+    """A part made to order: its price is that of its finish."""
+    mass = item.volume / MM3_PER_CM3 * density
+    price = prices.of(str(item.finish), mass)
+    row = _row(item.name, item.what, 1, item.material, mass)
+    return {**row, **price_columns(1, price), "from": BOUGHT}
+
+
+def _with_finish(price: Price | None, item: PrintedItem, prices: Prices) -> Price | None:
+    """The price of a print with that of its finish; None where one has none."""
+    if price is None or item.finish is None:
+        return price
+    finish = prices.of(item.finish, 0.0)
+    if finish is None or finish.currency != price.currency:
+        return None
+    source = f"{price.source}; {finish.source}"
+    return replace(price, amount=price.amount + finish.amount, source=source)
 
 
 def ball_rows(prototype: PrototypeLayout, prices: Prices) -> Iterator[Row]:
@@ -268,8 +274,8 @@ def _read_row(where: str, cells: Mapping[str, str]) -> Row:
         except ValueError:
             raise SpecError(f"{where}, column {column}: no number: build again") from None
         row[column] = int(number) if number is not None and column in WHOLE else number
-    if cells["from"] not in (*KINDS, *WORK):
-        allowed = ", ".join((*KINDS, *WORK))
+    if cells["from"] not in (*KINDS, TOOL):
+        allowed = ", ".join((*KINDS, TOOL))
         raise SpecError(f"{where}, column from: allowed are {allowed}: build again")
     return row
 
@@ -295,8 +301,8 @@ def _sums(rows: Sequence[Row]) -> Iterator[str]:
         f"{sums['parts_printed']} parts{also} to print: {kg:.1f} kg, "
         f"{_money(sums['filament_price'])}, {hours:.0f} h ({hours / DAY_H:.1f} days)"
     )
-    if sums["work_price"]:
-        yield f"finish of caps, other tools: {_money(sums['work_price'])}"
+    if sums["tools_price"]:
+        yield f"other tools: {_money(sums['tools_price'])}"
     yield f"in all {_money(by_currency(rows))}, as estimated and without shipping"
     yield f"{sums['mass_g'] / KG_G:.1f} kg in all, printed parts as solids"
     yield "not in the list: camera, lens, computer, drill, saw, soldering iron, paint"

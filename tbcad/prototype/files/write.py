@@ -30,7 +30,7 @@ from tbcad.prototype.arrangement import PrototypeModel, arrangements
 from tbcad.prototype.assembly_steps.book import write_book
 from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.prototype.assembly_steps.steps import mounting_record
-from tbcad.prototype.base.caps import cap_limits, cap_sheet
+from tbcad.prototype.base.caps import cap_item, cap_limits, cap_sheet
 from tbcad.prototype.drive.drive import base_torques, drive_loads
 from tbcad.prototype.electronics import Wiring
 from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_component
@@ -125,7 +125,7 @@ def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: P
     """Rows of the parts list; estimates are of the printed parts, in their order."""
     layout, density = built.layout, built.spec.printer.density_g_cm3
     printed = [
-        bom.cap_item(layout, part.ball, part.solid.volume, estimate)
+        cap_item(layout, part.ball, part.solid.volume, estimate)
         if part.role == "cap"
         else bom.PrintedItem(
             part.name, part.what, part.solid.volume, estimate, tool=part.role == "tool"
@@ -133,7 +133,7 @@ def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: P
         for part, estimate in zip(built.printed, estimates, strict=True)
     ]
     rows = bom.bom_rows(layout, built.drive, built.purchased, printed, density, built.parts, prices)
-    return [*rows, *bom.work_rows(layout, len(rows) + 1, prices)]
+    return [*rows, *bom.tool_rows(len(rows) + 1, prices)]
 
 
 def _write_tables(built: PrototypeModel, folder: Path) -> None:

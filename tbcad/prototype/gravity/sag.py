@@ -172,7 +172,7 @@ def weighed_base(built: PrototypeModel, meshes: list[ColouredMesh]) -> WeighedBa
     No list says how stiff the bearings of a rotary stage are.
     """
     layout, printer, balance = built.layout, built.spec.printer, built.balance
-    axes, balls = balance.frame, ball_masses(built.layout, built.spec.printer.density_g_cm3)
+    axes, balls = balance.frame, ball_masses(built.layout)
     shown = {one.name: one.mesh for one in meshes}
     carrier = [p.name for p in built.printed if p.role == "base" and p.name != "zero_disc"]
     if "shaft" not in shown:

@@ -236,7 +236,7 @@ def _totals(sums: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "Bought", _money(sums["bought_price"])
     if sums["without_price"]:
         yield "Bought, without a price", f"{sums['without_price']} kinds"
-    yield "Finish of caps, tools", _money(sums["work_price"])
+    yield "Tools", _money(sums["tools_price"])
     yield "Material to print", f"{sums['filament_g'] / G_PER_KG:.2f} kg"
     yield "Price of that material", _money(sums["filament_price"])
     yield "Printing", f"{sums['print_hours']:.0f} h"

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from tbcad.core.optics.sphere_forms import FORM_TERMS, power_slope
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.parameters import Block, Prior, prior_of
 from tbcad.rig.machine.designed import LED_MM, Motion
@@ -52,7 +53,10 @@ def prototype_prior(
     A known lens is fixed; measured radii have numbers of spheres, values and standard deviations,
     mm.
     """
-    radius, radii = _radii(machine, errors, arm > 0, measured)
+    machine, powers = _powers(machine, errors, measured)
+    with_form = 0.0 * powers if machine.forms is None else np.sign(machine.forms.half_aperture)
+    balls = [one for one in measured if not with_form[one[0]]]
+    radius, radii = _radii(machine, errors, arm > 0, balls)
     centres = np.hypot(errors.seat.sigma, arm * errors.cap_tilt.sigma)
     offset = math.hypot(zero_error / math.sqrt(3), errors.rotation_angle.sigma)
     known = _camera(machine, errors, lens_known) | {
@@ -67,6 +71,8 @@ def prototype_prior(
         Block.TURN: _with_sag(errors.axis_wobble, errors, [one.turn for one in moved]),
         Block.SHIFT: _with_sag(errors.axis_runout, errors, [one.shift for one in moved]),
         Block.SAG: errors.sag.sigma,
+        Block.POWER: powers,
+        Block.FORM: with_form[:, None] * form_sigmas(errors),
     }
     share = errors.sag.mean
     mean = replace(
@@ -131,8 +137,41 @@ def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[Block, A
     }
 
 
+def form_sigmas(errors: Errors) -> Floats:
+    """Standard deviations of the terms of a cap's form, mm, (t,)."""
+    return np.concatenate(
+        [
+            np.full(len(terms), getattr(errors, f"cap_{name}").sigma)
+            for name, terms in FORM_TERMS.items()
+        ]
+    )
+
+
+def _powers(machine: Machine, errors: Errors, measured: Measured) -> tuple[Machine, Floats]:
+    """The machine with caps as measured about their apices, and sigmas of their sagittas, mm, (k,).
+
+    InputError: a measured radius is smaller than the part in use.
+    """
+    if (forms := machine.forms) is None:
+        return machine, np.zeros(len(machine.radius))
+    radius, half = machine.radius.copy(), forms.half_aperture
+    sigma = np.where(half > 0, errors.cap_sagitta.sigma, 0.0)
+    for number, value, uncertainty in measured:
+        if half[number] == 0:
+            continue
+        if value <= half[number]:
+            raise InputError(
+                f"--measured {number + 1}={value:g}: the part of this cap in use is "
+                f"{2 * half[number]:.1f} mm wide: give its radius, not its sagitta"
+            )
+        radius[number] = value
+        sigma[number] = uncertainty / abs(power_slope(radius, half)[number])
+    centre = machine.centre - (radius - machine.radius)[:, None] * forms.outward
+    return replace(machine, radius=radius, centre=centre), sigma
+
+
 def _radii(
-    machine: Machine, errors: Errors, is_cap: Bools, measured: Measured
+    machine: Machine, errors: Errors, is_cap: Bools, measured: Sequence[tuple[int, float, float]]
 ) -> tuple[Floats, Floats]:
     made, bought = errors.whole_radius, errors.ball_radius
     radius = machine.radius + np.where(is_cap, made.mean, bought.mean)

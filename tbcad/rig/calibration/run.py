@@ -105,7 +105,7 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
     for one, setup in zip(machines.values(), setups, strict=True):
         progress("highlights in photographs")
         measured = parse_measured(tuple(options.measured), len(setup.plan))
-        prior = setup.prior(process_errors(process), measured)
+        prior = setup.prior(process_errors(process, caps=export.spec.prototype.caps), measured)
         detection = detect(one, prior, object_room(export), dome_radius(export), detail)
         progress("machine and its uncertainty")
         found.append(calibrate(setup, detection, prior, detail))

@@ -143,7 +143,7 @@ def _whole_table(setup: Setup, layouts: list[Layout], progress: Progress) -> Tab
 def whole_errors(setup: Setup, leds: Floats, process: str, noise_px: float) -> RayUncertainty:
     """How well the mirrors' rays are known after a whole run with LEDs (l, 3) at places in mm."""
     lit = replace(setup, designed=replace(setup.designed, leds=leds))
-    prior = lit.prior(process_errors(load_process(process)))
+    prior = lit.prior(process_errors(load_process(process), caps=lit.export.spec.prototype.caps))
     seen = _seen(setup, prior.mean, np.arange(len(setup.frames)))
     _, _, frame, sphere = ray_places(setup)
     known = _bound(prior, noise_px, seen)

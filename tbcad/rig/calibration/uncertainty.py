@@ -173,9 +173,13 @@ def ray_slopes(prior: Prior, values: Floats, frame: Ints, sphere: Ints) -> tuple
 
 def ray_directions(machine: Machine, frame: Ints, sphere: Ints) -> Floats:
     """Unit vectors (m, 3) of the rays from spheres in frames to the object's centre."""
-    centre, radius = machine.centres(frame, sphere), machine.radius[sphere]
-    pinhole = machine.camera.pinhole
-    point = reflections(centre, radius, np.zeros_like(centre), pinhole).point
+    light, radius, pinhole = (
+        np.zeros((len(frame), 3)),
+        machine.radius[sphere],
+        machine.camera.pinhole,
+    )
+    centre = machine.reflecting_centres(frame, sphere, light)
+    point = reflections(centre, radius, light, pinhole).point
     return reflected_rays(pinhole, point, unit(point - centre))
 
 

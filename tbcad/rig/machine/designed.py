@@ -8,8 +8,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tbcad.core.geometry.rotations import rotated
+from tbcad.core.geometry.vectors import perpendicular_axes
 from tbcad.core.optics.camera import LensCamera, without_distortion
 from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
+from tbcad.core.optics.sphere_forms import TERM_COUNT, Forms
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, balls_at_stops, prototype_run
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
@@ -21,7 +23,12 @@ from tbcad.rig.machine.machine import OF_FRAMES, Machine
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.prototype.gravity import Gravity
-from tbcad.tolerancing.prototype.windows import PrototypeDraws, draw_prototypes, tilted_centres
+from tbcad.tolerancing.prototype.windows import (
+    PrototypeDraws,
+    draw_prototypes,
+    powered_plan,
+    tilted_centres,
+)
 from tbcad.types import Bools, Floats
 
 RUNS = 2  # of the base through its stops, the object turned by 180 degrees between both
@@ -54,6 +61,7 @@ def designed_prototype(export: ExportedDesign, plan: Plan) -> Machine:
         centre=plan.centre,
         radius=plan.radius,
         leds=read_leds(export.folder),
+        forms=designed_forms(plan),
     )
 
 
@@ -144,7 +152,10 @@ def _balls(plan: Plan, machine: Machine, frames: tuple[Frame, ...], turn: int) -
         on_base = points if there.sag is None else points + there.sag
         return there.placed(on_base.reshape(-1, 3), stop).reshape(points.shape)
 
-    return balls_at_stops(plan, machine.centre, machine.radius, place)
+    if there.forms is None:
+        return balls_at_stops(plan, machine.centre, machine.radius, place)
+    forms = there.forms_in(stop, np.tile(np.arange(len(plan)), stops)).reshape(stops, len(plan), -1)
+    return balls_at_stops(plan, machine.centre, machine.radius, place, forms)
 
 
 @dataclass(frozen=True)
@@ -205,18 +216,23 @@ def random_build(
     across = plan.frame[1:]
     other = draw_other_errors(len(designed.leds), seed)
     tilt = Rotation.from_rotvec(draws.tilt[0] @ across)
-    seats = draws.seat[0]
+    seats, forms = draws.seat[0], designed_forms(plan)
+    if forms is not None:
+        axes = np.stack([tilt.apply(forms.axes[:, i]) for i in (0, 1)], axis=1)
+        forms = replace(forms, terms=draws.form[0], axes=axes)
+    powered = powered_plan(plan, draws.power[0])
     machine = Machine(
         camera=built_camera(designed.camera, draws, other),
         axis=tilt.apply(designed.axis),
         axis_point=designed.axis_point,
         angle=designed.angle + draws.angle[0].ravel() + moved.angle,
-        centre=tilt.apply(tilted_centres(plan, draws.cap_tilt[0]) + seats),
-        radius=plan.radius + draws.radius[0],
+        centre=tilt.apply(tilted_centres(powered, draws.cap_tilt[0]) + seats),
+        radius=powered.radius + draws.radius[0],
         leds=designed.leds + other.leds,
         turn=moved.turn + (draws.wobble[0] @ across).reshape(-1, 3),
         shift=moved.shift + (draws.runout[0] @ across).reshape(-1, 3),
         sag=moved.sag,
+        forms=forms,
     )
     # A ball is its own body, too large or too small as it is.
     body_radius = np.where(is_cap(plan), plan.body_radius, machine.radius)
@@ -232,6 +248,14 @@ def draw_other_errors(leds: int, seed: int, camera: int = 0) -> OtherErrors:
         distortion=np.array(DISTORTION) * random.standard_normal(len(DISTORTION)),
         principal=PRINCIPAL_PX * random.standard_normal(2),
     )
+
+
+def designed_forms(plan: Plan) -> Forms | None:
+    """Forms of the plan's caps without errors; None where it has none."""
+    half = plan.half_aperture
+    if half is None or not half.any():
+        return None
+    return Forms(np.zeros((len(half), TERM_COUNT)), perpendicular_axes(plan.normal), half)
 
 
 def is_cap(plan: Plan) -> Bools:

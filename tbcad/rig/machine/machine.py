@@ -6,6 +6,7 @@ turned between both runs; camera, axis and LEDs are not. The shell of one camera
 one frame, whose spheres are its mirrors. machine.json has its state, calibrated or simulated.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,20 @@ from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.reflection import reflection_points
+from tbcad.core.optics.sphere_forms import (
+    FIRST,
+    PER_MM,
+    TERM_COUNT,
+    Forms,
+    effective_centres,
+)
 from tbcad.errors import InputError
-from tbcad.records.calibration import CalibratedCamera, MachineRecord, SphereRecord
+from tbcad.records.calibration import (
+    CalibratedCamera,
+    FormRecord,
+    MachineRecord,
+    SphereRecord,
+)
 from tbcad.records.run import Frame
 from tbcad.types import Bools, Floats, Ints
 
@@ -32,6 +45,8 @@ CAMERA = {
 OF_FRAMES = {"turn": "turn_rad", "shift": "shift_mm", "sag": "sag_mm"}
 """Arrays of a machine's frames that it may lack, and their keys there."""
 ROUNDING = 1e-9  # of unit vectors
+MICROMETRE = 1e-3  # mm
+AGAIN = "calibrate again"
 
 
 @dataclass(frozen=True)
@@ -51,6 +66,8 @@ class Machine:
     shift: Floats | None = None
     # of the spheres in each frame by their weight, in the base's frame, mm, (f, k, 3)
     sag: Floats | None = None
+    # form errors of the spheres, of which caps have some; None: none
+    forms: Forms | None = None
 
     def centres(self, frame: Ints, sphere: Ints) -> Floats:
         """Centres of spheres (n,) in frames (n,), mm, (n, 3)."""
@@ -66,6 +83,28 @@ class Machine:
         if self.turn is not None:
             placed = Rotation.from_rotvec(self.turn[frame]).apply(placed)
         return placed if self.shift is None else placed + self.shift[frame]
+
+    def turned(self, on_base: Floats, frame: Ints) -> Floats:
+        """Vectors of the base (n, 3) as they are in frames (n,), (n, 3)."""
+        return self.placed(self.axis_point + on_base, frame) - self.placed(
+            np.broadcast_to(self.axis_point, on_base.shape), frame
+        )
+
+    def forms_in(self, frame: Ints, sphere: Ints) -> Floats:
+        """Forms of spheres (n,) in frames (n,), (n, FORM_COLUMNS); they have to be known."""
+        assert self.forms is not None
+        rows = self.forms.rows()[sphere]
+        for start in range(FIRST, PER_MM, 3):
+            rows[:, start : start + 3] = self.turned(rows[:, start : start + 3], frame)
+        return rows
+
+    def reflecting_centres(self, frame: Ints, sphere: Ints, light: Floats) -> Floats:
+        """Centres (n, 3) of spheres that show lights (n, 3) where those with their forms do, mm."""
+        centre = self.centres(frame, sphere)
+        if self.forms is None:
+            return centre
+        form = self.forms_in(frame, sphere)
+        return effective_centres(centre, self.radius[sphere], form, light, self.camera.pinhole)
 
     def of_frames(self, frames: Ints) -> "Machine":
         """The same machine in some of its frames (g,)."""
@@ -85,8 +124,9 @@ class Machine:
 
     def highlights(self, frame: Ints, sphere: Ints, led: Ints) -> Floats:
         """Columns and rows (n, 2) at which spheres show LEDs in frames, each (n,), from 0."""
-        centre, camera = self.centres(frame, sphere), self.camera
-        points = reflection_points(centre, self.radius[sphere], self.leds[led], camera.pinhole)
+        light, camera = self.leds[led], self.camera
+        centre = self.reflecting_centres(frame, sphere, light)
+        points = reflection_points(centre, self.radius[sphere], light, camera.pinhole)
         return camera.project(points)
 
 
@@ -130,7 +170,33 @@ def write_machine(path: Path, machine: Machine, frames: tuple[Frame, ...]) -> No
         spheres=tuple(SphereRecord(centre_mm=at, radius_mm=radius) for at, radius in spheres),
         leds_mm=machine.leds.tolist(),
         **{key: _listed(getattr(machine, name)) for name, key in OF_FRAMES.items()},
+        forms=None if machine.forms is None else tuple(_form_records(machine.forms)),
     ).write(path)
+
+
+def _form_records(forms: Forms) -> Iterator[FormRecord]:
+    for k in np.flatnonzero(forms.half_aperture).tolist():
+        yield FormRecord(
+            ball=k + 1,
+            half_aperture_mm=forms.half_aperture[k],
+            axes=forms.axes[k].tolist(),
+            terms_um=(forms.terms[k] / MICROMETRE).tolist(),
+        )
+
+
+def _read_forms(path: Path, found: MachineRecord) -> Forms | None:
+    if found.forms is None:
+        return None
+    count = len(found.spheres)
+    axes = np.tile(np.eye(3)[:2], (count, 1, 1))
+    terms, half = np.zeros((count, TERM_COUNT)), np.zeros(count)
+    for one in found.forms:
+        k = one.ball - 1
+        axes[k], half[k] = one.axes, one.half_aperture_mm
+        terms[k] = MICROMETRE * np.array(one.terms_um)
+    if np.abs(axes @ axes.swapaxes(1, 2) - np.eye(2)).max() > ROUNDING:
+        raise InputError(f"{path}: axes of a form are no unit vectors at right angles: {AGAIN}")
+    return Forms(terms, axes, half)
 
 
 def _listed(values: Floats | None) -> list[Any] | None:
@@ -142,7 +208,7 @@ def read_machine(path: Path) -> tuple[Machine, tuple[Frame, ...]]:
     found = MachineRecord.read(path)
     axis, axes = np.array(found.axis), np.array(found.camera.axes)
     if abs(norm(axis) - 1) > ROUNDING or np.abs(axes @ axes.T - np.eye(3)).max() > ROUNDING:
-        raise InputError(f"{path}: axes are no unit vectors at right angles: calibrate again")
+        raise InputError(f"{path}: axes are no unit vectors at right angles: {AGAIN}")
     camera = LensCamera(
         **{name: np.array(getattr(found.camera, key)) for name, key in CAMERA.items()},
         width_px=found.camera.width_px,
@@ -160,5 +226,6 @@ def read_machine(path: Path) -> tuple[Machine, tuple[Frame, ...]]:
             name: None if getattr(found, key) is None else np.array(getattr(found, key))
             for name, key in OF_FRAMES.items()
         },
+        forms=_read_forms(path, found),
     )
     return machine, found.frames

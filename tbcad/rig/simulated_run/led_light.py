@@ -11,6 +11,7 @@ from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.led_dome import disc_images, dome_samples
 from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.core.optics.reflection import reflection_points
+from tbcad.core.optics.sphere_forms import effective_centres
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.ball_rays import (
     ON_BALL_MM,
@@ -18,7 +19,7 @@ from tbcad.light.simulate.prototype.ball_rays import (
     balls_between,
     points_within_walls,
 )
-from tbcad.light.simulate.prototype.run import HALF_TURN
+from tbcad.light.simulate.prototype.run import HALF_TURN, SPHERES
 from tbcad.light.simulate.scene.ray_casting import embree_scene
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
 from tbcad.rig.machine.designed import BuiltPrototype
@@ -98,8 +99,9 @@ def balls_of_frame(built: BuiltPrototype, frame: int) -> Floats:
     spheres = np.arange(len(machine.radius))
     frames = np.full(len(spheres), frame)
     bodies = replace(machine, centre=built.body_centre).centres(frames, spheres)
+    forms = [] if machine.forms is None else [machine.forms_in(frames, spheres)]
     return np.column_stack(
-        [machine.centres(frames, spheres), machine.radius, bodies, built.body_radius]
+        [machine.centres(frames, spheres), machine.radius, bodies, built.body_radius, *forms]
     )
 
 
@@ -129,6 +131,8 @@ def _reflected_once(
     camera = machine.camera
     ball, led = np.indices((len(balls), len(machine.leds))).reshape(2, -1)
     centre, radius, place = balls[ball, :3], balls[ball, 3], machine.leds[led]
+    if balls.shape[1] > SPHERES:  # near where the LED is shown each is as this sphere
+        centre = effective_centres(centre, radius, balls[ball, SPHERES:], place, camera.pinhole)
     disc = disc_images(camera, centre, radius, place, dome)
     from_place, share = dome_samples(disc.axes)
     # As bright everywhere in the image: what is shown larger gives more light.

@@ -16,14 +16,9 @@ import numpy as np
 from tbcad.common.compiled import compiled_loop
 from tbcad.core.geometry.vectors import dot, perpendicular_axes
 from tbcad.core.optics.pedestals.cells import GrooveWalls
+from tbcad.core.optics.zernike import TERMS, monomials, term_polynomials
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.montecarlo.form import (
-    ASTIGMATISM,
-    TERMS,
-    monomials,
-    term_polynomials,
-    term_shares,
-)
+from tbcad.tolerancing.montecarlo.form import ASTIGMATISM, term_shares
 from tbcad.types import Floats, Ints
 
 MISSING_VARIANCE = 1e-6  # that a field may lack at any point: 0.1 % of its standard deviation

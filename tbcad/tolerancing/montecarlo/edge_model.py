@@ -13,21 +13,14 @@ from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.cells import Cells
 from tbcad.core.optics.pedestals.cells import GrooveWalls, PedestalCells, groove_walls
 from tbcad.core.optics.power_diagram import PLANES
+from tbcad.core.optics.sphere_forms import FIRST, FORM_COLUMNS, HEIGHT, PER_MM, SECOND
 from tbcad.core.optics.surfaces import Surfaces
+from tbcad.core.optics.zernike import MONOMIALS, term_polynomials
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.shell.cell_outlines import rows_and_columns
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, WarpMaps, pivots, smooth_field, warp_map
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
-from tbcad.tolerancing.montecarlo.form import (
-    FIRST,
-    FORM_COLUMNS,
-    HEIGHT,
-    MONOMIALS,
-    PER_MM,
-    SECOND,
-    term_polynomials,
-)
 from tbcad.types import Bools, Floats, Ints
 
 # Limit of an edge's length, in distances of its mirrors' farthest corners from their apices: the

@@ -62,6 +62,11 @@ class Errors:
     ball_radius: Error = NO_ERROR  # of each ball's radius, by its grade
     seat: Error = NO_ERROR
     cap_tilt: Error = NO_ERROR
+    cap_sagitta: Error = NO_ERROR
+    cap_astigmatism: Error = NO_ERROR
+    cap_coma: Error = NO_ERROR
+    cap_trefoil: Error = NO_ERROR
+    cap_spherical: Error = NO_ERROR
     wind_up: Error = NO_ERROR
     sag: Error = NO_ERROR
     warp: Error = NO_ERROR  # of length 0 an error of each mirror's centre

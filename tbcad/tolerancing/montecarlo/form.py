@@ -14,13 +14,15 @@ whose spheres have the unit normals g and g' at a point is thus displaced by a g
 to first order in the heights, and a mirror's normal is turned by its height's gradient.
 """
 
-from math import comb, factorial, sqrt
+from math import sqrt
 from typing import TypeAlias
 
 import numpy as np
 
 from tbcad.common.compiled import compiled_loop
 from tbcad.core.geometry.loop_vectors import Vector, dot, minus, plus_scaled, vector
+from tbcad.core.optics.sphere_forms import FIRST, HEIGHT, PER_MM, SECOND
+from tbcad.core.optics.zernike import ORDERS, TERMS
 from tbcad.tolerancing.montecarlo.edge_samples import (
     FIRST_HEIGHT,
     FIRST_NORMAL,
@@ -40,18 +42,9 @@ from tbcad.tolerancing.montecarlo.edge_samples import (
 from tbcad.tolerancing.montecarlo.visible_edges import APEX, CURVATURE, NORMAL
 from tbcad.types import Floats
 
-ORDERS = (2, 3, 4)
 VARIANCE_RATIO = 0.5  # from order to order of waviness, which falls with frequency: a judgement
-DEGREE = ORDERS[-1]
-# Powers of x and y, in the order of the columns of a polynomial.
-MONOMIALS = tuple((d - j, j) for d in range(DEGREE + 1) for j in range(d + 1))
-# Orders and azimuthal numbers of the terms: cosines have positive numbers, sines negative ones.
-TERMS = tuple((n, m) for n in ORDERS for m in range(-n, n + 1, 2))
 
 ASTIGMATISM = tuple(k for k, (n, m) in enumerate(TERMS) if (n, abs(m)) == (2, 2))
-# Columns of a mirror's form: the polynomial of its height (tbcad.tolerancing.montecarlo.form), mm,
-# the axes of x and y, and what one millimetre is in the polynomial's unit.
-HEIGHT, FIRST, SECOND, PER_MM, FORM_COLUMNS = 0, 15, 18, 21, 22
 Form: TypeAlias = tuple[float, ...]
 SMALLEST_SINE_SQUARED = 1e-4  # surfaces that meet at a smaller angle have no edge to be found
 
@@ -61,33 +54,6 @@ def term_shares() -> Floats:
     orders = np.array([n for n, _ in TERMS])
     of_order = VARIANCE_RATIO ** (orders - ORDERS[0]) / (orders + 1)
     return np.asarray(of_order / of_order.sum())
-
-
-def term_polynomials() -> Floats:
-    """Coefficients of each term, (t, monomials)."""
-    tables = (_term(n, m) for n, m in TERMS)
-    return np.array([[table[powers] for powers in MONOMIALS] for table in tables])
-
-
-def monomials(x: Floats, y: Floats) -> Floats:
-    """Powers of places (p,) in the unit disc, (p, monomials)."""
-    return np.stack([x**i * y**j for i, j in MONOMIALS], axis=-1)
-
-
-def _term(n: int, m: int) -> Floats:
-    """Coefficients of x^i y^j of one Zernike polynomial, (degree + 1, degree + 1)."""
-    size, result = abs(m), np.zeros((DEGREE + 1, DEGREE + 1))
-    for k in range((n - size) // 2 + 1):
-        squares = (n - size) // 2 - k  # power of x^2 + y^2
-        radial = (-1) ** k * factorial(n - k) / factorial(k)
-        radial /= factorial((n + size) // 2 - k) * factorial(squares)
-        for j in range(size + 1):  # real or imaginary part of (x + i y)^|m|
-            around = comb(size, j) * 1j**j
-            for i in range(squares + 1):
-                place = size - j + 2 * (squares - i), j + 2 * i
-                part = around.real if m >= 0 else around.imag
-                result[place] += radial * comb(squares, i) * part
-    return np.asarray(result * sqrt((n + 1) * (1 if m == 0 else 2)))
 
 
 def mean_square_slope() -> float:

@@ -6,6 +6,7 @@ from a maker's tolerance.
 
 from collections.abc import Sequence
 from difflib import get_close_matches
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Literal
@@ -21,7 +22,7 @@ from tbcad.core.spec.errors import (
     unknown_key,
     validation_error,
 )
-from tbcad.core.spec.prototype import GradeName
+from tbcad.core.spec.prototype import CapMaking, GradeName
 from tbcad.core.spec.section import Section, as_tuple, whole
 from tbcad.prototype.balls.catalogue import load_grades
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
@@ -48,6 +49,8 @@ BUILT_IN = (
 )  # fmt: skip
 DEFAULT_PROCESS = "sla"
 BY_USER = "set by an option"
+CAPS_FILE = "caps.toml"
+AS_CAPS = RootMeanSquare(magnitude=0, source=f"By how the design's caps are made: {CAPS_FILE}")
 SHARP = "Not stated: valleys are taken as sharp, a judgement that flatters milled shells"
 
 
@@ -105,6 +108,16 @@ class Process(Section):
     """Prototype: each ball's centre along each axis."""
     cap_tilt_mrad: Milliradians
     """Prototype: each cap about each axis across its own."""
+    cap_sagitta_um: RootMeanSquare = AS_CAPS
+    """Prototype: each cap's power, as the sagitta of its front over the part in use."""
+    cap_astigmatism_um: RootMeanSquare = AS_CAPS
+    """Prototype: each of both terms of the front's astigmatism, root mean square over that part."""
+    cap_coma_um: RootMeanSquare = AS_CAPS
+    """Prototype: likewise, of its coma."""
+    cap_trefoil_um: RootMeanSquare = AS_CAPS
+    """Prototype: likewise, of its trefoil."""
+    cap_spherical_um: RootMeanSquare = AS_CAPS
+    """Prototype: spherical aberration of the front, root mean square over that part."""
     wind_up_percent: Percent
     """Prototype: turn of the base because motor and belt yield to gravity, of that worked out."""
     sag_percent: Percent
@@ -144,16 +157,29 @@ def load_process(which: str, overrides: Sequence[str] = ()) -> Process:
         raise validation_error(error, Process, name, {key for key, _ in options}) from None
 
 
-def process_errors(process: Process, known_coating_um: float = 0.0) -> Errors:
+def process_errors(
+    process: Process, known_coating_um: float = 0.0, caps: CapMaking = "printed"
+) -> Errors:
     """Return the errors of a process in mm, radians and shares.
 
-    Only a coating beyond the known one, which the design allows for, is an error.
+    Only a coating beyond the known one, which the design allows for, is an error. Forms of caps
+    that the process does not state are those of how the design's caps are made.
     """
     kinds = {key: value for key, value in process if isinstance(value, ErrorSpec)}
+    made = {} if caps == "none" else cap_forms(caps)
+    kinds |= {key: one for key, one in made.items() if key not in process.model_fields_set}
     coating = kinds["coating_um"]
     kinds["coating_um"] = coating.model_copy(update={"mean": coating.mean - known_coating_um})
     errors = {key.rpartition("_")[0]: kind.error for key, kind in kinds.items()}
     return Errors(**errors, ball_radius=ball_radius_error(process.ball_grade))
+
+
+@cache
+def cap_forms(caps: Literal["printed", "turned"]) -> dict[str, RootMeanSquare]:
+    """Form errors of caps by how they are made, as the keys of a process that begin with cap."""
+    file = files("tbcad.tolerancing").joinpath("process", CAPS_FILE)
+    table = read_toml(file, CAPS_FILE, "process")[caps]
+    return {key: RootMeanSquare.model_validate(one) for key, one in table.items()}
 
 
 def ball_radius_error(grade: str) -> Error:

@@ -18,6 +18,15 @@ from scipy.spatial.transform import Rotation
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays, reflection_points
+from tbcad.core.optics.sphere_forms import (
+    FIRST,
+    FORM_TERMS,
+    PER_MM,
+    Forms,
+    effective_centres,
+    heights,
+    powered_radius,
+)
 from tbcad.core.optics.windows import cell_windows
 from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, PrototypeRun, prototype_runs
 from tbcad.light.simulate.scene.reflector import Reflector
@@ -49,6 +58,10 @@ class PrototypeDraws:
     runout: Floats  # of the axis there, along azimuth zero and across it, mm, (s, 2, t, 2)
     # of the base about azimuth zero and across it at those stops, at the object, radians
     wobble: Floats  # (s, 2, t, 2)
+    # of caps' fronts: sagittas too large over the part in use, and the form besides that, mm
+    # (tbcad.core.optics.sphere_forms), (s, k) and (s, k, t)
+    power: Floats
+    form: Floats
     sag: Floats  # of displacements by weight as in `Gravity`, as shares of them, (s, 2)
     tilt: Floats  # of the axis about azimuth zero and across, at the object, radians, (s, 2)
     camera_shift: Floats  # of the pinhole, mm, (s, 3)
@@ -65,8 +78,8 @@ def draw_prototypes(
     """Errors of some prototypes; see tbcad.tolerancing.montecarlo.draws.draw_kinds.
 
     Purchased balls have the errors of their grade, caps (k,) those of a mirror that is a part of
-    its own (`Errors.whole_radius`), each with its centre unchanged. Gravity turns the base at the
-    t stops of one run by the wind-up, radians, (t,).
+    its own (`Errors.whole_radius`), each with its centre unchanged, and those of a cap's form.
+    Gravity turns the base at the t stops of one run by the wind-up, radians, (t,).
     """
     k, t = len(is_cap), len(wind_up)
     shapes: dict[str, Shape] = {  # in the order of the random streams; only append to it
@@ -83,6 +96,8 @@ def draw_prototypes(
         "wind_up": (),
         "sag": (2,),
         "axis_wobble": (2, t, 2),
+        "cap_sagitta": (k,),
+        **{f"cap_{name}": (k, len(terms)) for name, terms in FORM_TERMS.items()},
     }
     errors = replace(errors, sphere_radius=errors.whole_radius)
     drawn = draw_kinds(errors, seed, builds, shapes, FIRST_STREAM)
@@ -93,6 +108,12 @@ def draw_prototypes(
         angle=drawn["rotation_angle"] + drawn["wind_up"][:, None, None] * wind_up,
         runout=drawn["axis_runout"],
         wobble=drawn["axis_wobble"],
+        power=np.where(is_cap, drawn["cap_sagitta"], 0.0),
+        form=np.where(
+            is_cap[:, None],
+            np.concatenate([drawn[f"cap_{name}"] for name in FORM_TERMS], axis=2),
+            0.0,
+        ),
         sag=drawn["sag"],
         tilt=drawn["axis_tilt"],
         camera_shift=drawn["camera_shift"],
@@ -207,27 +228,51 @@ class RunPose:
     lens: Floats  # turn directions in the designed camera, as rows, into actual ones, (m, 3, 3)
     centre: Floats  # of the ball in each window, mm, (m, 3)
     radius: Floats  # of each, mm, (m,)
+    form: Floats  # of each, (m, FORM_COLUMNS)
     highlight: Floats  # unit directions in which they show the object's centre, (m, 3)
 
 
 def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: int) -> RunPose:
     """Camera and balls when each mirror of one run is photographed."""
     run, plan = model.runs[half], model.plan
-    on_base = (tilted_centres(plan, draws.cap_tilt[build]) + draws.seat[build])[run.ball]
+    powered = powered_plan(plan, draws.power[build])
+    on_base = (tilted_centres(powered, draws.cap_tilt[build]) + draws.seat[build])[run.ball]
     on_base = on_base + model.gravity.sagged(draws.sag[build])[run.stop, run.ball]
     angle = plan.angle[run.stop] + draws.angle[build, half, run.stop]
     tilt = Rotation.from_rotvec(draws.tilt[build] @ plan.frame[1:])
     runout = draws.runout[build, half, run.stop] @ plan.frame[1:]
     wobble = Rotation.from_rotvec(draws.wobble[build, half, run.stop] @ plan.frame[1:])
-    centre = wobble.apply(tilt.apply(rotated(on_base, plan.frame[0], angle))) + runout
-    radius = plan.radius[run.ball] + draws.radius[build, run.ball]
+
+    def turned(vectors: Floats) -> Floats:
+        return np.asarray(wobble.apply(tilt.apply(rotated(vectors, plan.frame[0], angle))))
+
+    centre = turned(on_base) + runout
+    radius = powered.radius[run.ball] + draws.radius[build, run.ball]
+    form = form_rows(plan, draws.form[build])[run.ball]
+    for start in range(FIRST, PER_MM, 3):
+        form[:, start : start + 3] = turned(form[:, start : start + 3])
     pinhole = model.pinhole + draws.camera_shift[build]
     # A longer focal length makes pictures larger: a pixel's ray is nearer to the axis.
     nearer = np.array([[1 / draws.focal[build]], [1 / draws.focal[build]], [1.0]])
     lens = nearer * Rotation.from_rotvec(draws.camera_tilt[build]).apply(model.axes)
     lenses = np.repeat(lens[None], len(radius), axis=0)
-    shown = reflection_points(centre, radius, np.zeros(3), pinhole, ITERATIONS)
-    return RunPose(pinhole, lenses, centre, radius, unit(shown - pinhole))
+    still = np.zeros(3)
+    seen = effective_centres(centre, radius, form, still, pinhole)
+    shown = reflection_points(seen, radius, still, pinhole, ITERATIONS)
+    return RunPose(pinhole, lenses, centre, radius, form, unit(shown - pinhole))
+
+
+def powered_plan(plan: Plan, power: Floats) -> Plan:
+    """The plan with caps whose sagittas are larger by a power (k,), mm; their apices stay."""
+    if plan.half_aperture is None:
+        return plan
+    return replace(plan, radius=powered_radius(plan.radius, plan.half_aperture, power))
+
+
+def form_rows(plan: Plan, terms: Floats) -> Floats:
+    """Forms of the plan's spheres by their terms, mm, (k, t), as rows (k, FORM_COLUMNS)."""
+    half = np.zeros(len(plan)) if plan.half_aperture is None else plan.half_aperture
+    return Forms(terms, perpendicular_axes(plan.normal), half).rows()
 
 
 def tilted_centres(plan: Plan, tilt: Floats) -> Floats:
@@ -274,7 +319,7 @@ def _seen(model: PrototypeWindows, poses: list[RunPose]) -> tuple[Floats, Floats
     misses = [
         minimum_miss_distances(
             *((run.side, run.first), run.outward),
-            *(pose.highlight, pose.lens, pose.pinhole, pose.centre, pose.radius),
+            *(pose.highlight, pose.lens, pose.pinhole, pose.centre, pose.radius, pose.form),
         )
         for run, pose in zip(model.runs, poses, strict=True)
     ]
@@ -292,7 +337,9 @@ def _middle_rays(run: RunWindows, pose: RunPose) -> tuple[Floats, Floats]:
     inside = pose.radius**2 - dot(to_centre, to_centre) + along**2
     half_chord = np.sqrt(np.where(inside < 0, np.nan, inside))
     point = pose.pinhole + (along - half_chord)[:, None] * ray
-    return point, reflected_rays(pose.pinhole, point, (point - pose.centre) / pose.radius[:, None])
+    normal = (point - pose.centre) / pose.radius[:, None]
+    normal = unit(normal - heights(pose.form, point - pose.centre)[1])
+    return point, reflected_rays(pose.pinhole, point, normal)
 
 
 def _offsets(ray: tuple[Floats, Floats], designed: tuple[Floats, Floats]) -> Floats:

@@ -321,3 +321,19 @@ def test_every_design_gets_allowed_numbers(scale: float, lean: float, minor: flo
     stage, capture = spec.prototype.stage, 25 * scale
     assert -capture <= stage.top_mm <= 0
     assert all(math.dist(place, (0, 0, 0)) < capture for place in stage.leds_mm)
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [("true", "printed"), ("false", "none"), ("turned", "turned"), ("printed", "printed")],
+)
+def test_how_caps_are_made(given: str, meant: str) -> None:
+    """True and false are of designs before there were words."""
+    spec = load_spec(None, [f"prototype.caps={given}"])
+    assert spec.prototype.caps == meant
+    assert spec.cap_density_g_cm3 == {"printed": 1.18, "turned": 2.7, "none": 0.0}[meant]
+
+
+def test_caps_of_another_kind_are_refused_in_one_line() -> None:
+    with pytest.raises(SpecError, match="caps is 'resin', allowed is printed or turned or none"):
+        load_spec(None, ["prototype.caps=resin"])

@@ -41,10 +41,18 @@ def test_limits_and_sheets(layout: PrototypeLayout, tmp_path: Path) -> None:
 
         sheet = cap_sheet("design", base, layout, one)
         texts = [entity.text for entity in sheet.entities if isinstance(entity, Text)]
-        (told,) = filter(None, (re.fullmatch(r"R ([\d.]+) \+-([\d.]+) CX", t) for t in texts))
+        (told,) = filter(
+            None, (re.fullmatch(r"R ([\d.]+) CX, within \+-([\d.]+) by 3/", t) for t in texts)
+        )
         assert float(told[1]) == pytest.approx(balls.radius[k], abs=0.051)
         assert float(told[2]) == pytest.approx(one.radius_tolerance_mm, abs=0.006)
-        assert any(text.startswith(f"3/ -({one.irregularity_fringes:.1f})") for text in texts)
+        figures = one.power_fringes, one.irregularity_fringes, one.symmetric_fringes
+        code = "3/ {:.1f}({:.1f}/{:.1f}), fringes".format(*figures)
+        assert any(text.startswith(code) for text in texts)
+        # ISO 10110-5: A is the sagitta error of a radius at its tolerance.
+        half, wrong = one.aperture_mm / 2, balls.radius[k] + one.radius_tolerance_mm
+        sags = [r - np.sqrt(r**2 - half**2) for r in (balls.radius[k], wrong)]
+        assert (sags[0] - sags[1]) / (546.07e-6 / 2) == pytest.approx(one.power_fringes, rel=0.05)
         sheet.write(tmp_path)
         suffixes = {path.suffix for path in tmp_path.glob(f"drawing_cap_{one.ball}.*")}
         assert suffixes == {".pdf", ".dxf"}

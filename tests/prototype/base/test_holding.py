@@ -80,7 +80,7 @@ def test_catalogues_have_at_least_the_derated_pull_on_a_plate(
     assert derated <= newton <= 1.02 * derated / DERATING
 
 
-AT_REST = Motion(0.0, 0.0, 1.27)
+AT_REST = Motion(0.0, 0.0)
 TILT = np.radians(50.0)
 
 
@@ -108,7 +108,7 @@ class TestForceNeeded:
         axes = frame_about(random.normal(size=3))[[1, 2, 0]]
         normals = pad_normals(TILT, random.uniform(0, 2, 1)) @ axes
         centre, mass = random.normal(size=(1, 3)) * 100, 0.3
-        motion = Motion(0.4, 2.0, 1.27)
+        motion = Motion(0.4, 2.0)
         needed = force_needed(normals, axes[2:], centre, np.array([1000 * mass]), frame, motion)
         along, out = frame[0], centre[0] * 1e-3
         out = out - (out @ along) * along

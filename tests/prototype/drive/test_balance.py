@@ -65,7 +65,7 @@ class TestTorque:
 
 class TestBalls:
     def test_balls_weigh_where_they_sit(self, small_prototype: PrototypeLayout) -> None:
-        masses = ball_masses(small_prototype, 1.27)
+        masses = ball_masses(small_prototype)
         bought = ~small_prototype.balls.cap
         assert len(masses) == len(small_prototype)
         assert masses.mass_g[bought].sum() == pytest.approx(small_prototype.mass_g)

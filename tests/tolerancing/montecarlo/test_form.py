@@ -6,22 +6,18 @@ import pytest
 from tbcad.core.geometry.vectors import dot, perpendicular_axes
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.reflection import reflected_rays
+from tbcad.core.optics.sphere_forms import FORM_COLUMNS, HEIGHT, PER_MM
+from tbcad.core.optics.zernike import TERMS, monomials, term_polynomials
 from tbcad.tolerancing.montecarlo.coverage import mirror_coverage
 from tbcad.tolerancing.montecarlo.draws import draw
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
 from tbcad.tolerancing.montecarlo.form import (
-    FORM_COLUMNS,
-    HEIGHT,
-    PER_MM,
-    TERMS,
     form_numbers,
     height,
     mean_square_slope,
-    monomials,
     ray_spread,
     slope,
-    term_polynomials,
     term_shares,
 )
 from tests.tolerancing.exact_builds import bisected_coverage

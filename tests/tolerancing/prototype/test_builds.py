@@ -22,6 +22,7 @@ from tbcad.tolerancing.prototype.windows import (
     PrototypeResult,
     PrototypeWindows,
     draw_prototypes,
+    powered_plan,
     prototype_model,
     prototype_result,
 )
@@ -220,6 +221,32 @@ class TestMotions:
         )
         assert unknown > 1.0
         assert known < 0.1
+
+    def test_a_caps_power_is_another_radius_about_its_apex(self, model: PrototypeWindows) -> None:
+        plan = replace(model.plan, half_aperture=np.where(model.is_cap, 5.0, 0.0))
+        power = 0.003 * model.is_cap
+        powered = powered_plan(plan, power)
+        assert (powered.apex == plan.apex).all()
+        drawn = replace(draws_of(model, 1), power=power[None])
+        found = coverage_of(replace(model, plan=plan), drawn)
+        built = coverage_of(replace(model, plan=powered), draws_of(model, 1))
+        assert found == pytest.approx(built, abs=1e-9)
+        assert np.abs(found - coverage_of(model, draws_of(model, 1))).max() > 0.1
+
+    def test_a_form_costs_four_times_distance_and_slope(self, model: PrototypeWindows) -> None:
+        """As the limits of a cap's drawing are worked out, for a saddle in one direction."""
+        size = 0.001  # of its slope at the rim 2 sqrt(6) times this over the half aperture
+        plan = replace(model.plan, half_aperture=np.where(model.is_cap, 8.0, 0.0))
+        formed, exact = replace(model, plan=plan), draws_of(model, 1)
+        form = np.zeros((1, *exact.form.shape[1:]))
+        form[:, :, 1] = size * model.is_cap
+        lost = np.abs(coverage_of(formed, exact) - coverage_of(formed, replace(exact, form=form)))
+        far = norm(plan.apex[model.is_cap]).mean()
+        most = 4 * far * 2 * np.sqrt(6) * size / 8.0
+        ball = np.concatenate([run.ball for run in model.runs])
+        of_caps = np.unique(model.virtual[model.is_cap[ball]])
+        assert 0.2 * most < np.median(lost[0, of_caps]) < 2 * most
+        assert np.delete(lost[0], of_caps) == pytest.approx(0, abs=1e-12)
 
 
 def test_later_builds_continue_earlier_ones(model: PrototypeWindows) -> None:

@@ -230,3 +230,41 @@ def test_command(
     assert main([str(copy), "--as-built", str(copy)]) == 2
     assert "machine.json" in capsys.readouterr().err
     assert contents(copy) == before
+
+
+def formed(machine: Machine, **changes: Any) -> Machine:
+    """The first ball with astigmatism of so many micrometres that its rays go elsewhere."""
+    form = {
+        "ball": 1,
+        "half_aperture_mm": 5.0,
+        "axes": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        "terms_um": [0.0, 50.0, *[0.0] * 5],
+    }
+    machine["forms"] = [form | changes]
+    return machine
+
+
+def test_a_form_changes_what_its_ball_shows(machine: Machine, judged: Judged) -> None:
+    before = judged()
+    formed(machine)
+    after = judged()
+    assert after.balls[0].coverage_mm != pytest.approx(before.balls[0].coverage_mm, abs=0.1)
+    assert after.balls[1].coverage_mm == pytest.approx(before.balls[1].coverage_mm)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"terms_um": [0.0] * 6}, "at least 7"),
+        ({"terms_um": [5000.0, *[0.0] * 6]}, "less than or equal to 1000"),
+        ({"half_aperture_mm": 0.0}, "greater than 0"),
+        ({"axes": [[1.0, 0.0, 0.0], [0.9, 0.1, 0.0]]}, "axes of a form"),
+        ({"ball": 9}, "a ball that is not there"),
+    ],
+)
+def test_a_form_that_cannot_be_is_refused(
+    machine: Machine, judged: Judged, changes: Machine, fault: str
+) -> None:
+    formed(machine, **changes)
+    with pytest.raises(BadExport, match=fault):
+        judged()

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.spatial.transform import Rotation
 
+from tbcad_verify.as_built.forms import TERMS, Fronts
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.files import AGAIN, MAX_TEXT_BYTES, open_folder, read
 from tbcad_verify.record.validation import Matrix, Strict, Vector, parse_json, validated
@@ -70,6 +71,25 @@ class MeasuredBall(Strict):
     radius: float = Field(alias="radius_mm", gt=0, le=1e4)
 
 
+class MeasuredForm(Strict):
+    """Form error of a cap's front beside its radius, with the base at angle zero."""
+
+    ball: int = Field(ge=1, le=MOST)
+    half: float = Field(alias="half_aperture_mm", gt=0, le=1e3)  # radius of the disc, mm
+    axes: list[Vector] = Field(min_length=2, max_length=2)  # of x and y, unit
+    # astigmatism, coma, trefoil, two each, and spherical aberration, root mean square over the disc
+    terms_um: list[Annotated[float, Field(ge=-1000, le=1000)]] = Field(
+        min_length=TERMS, max_length=TERMS
+    )
+
+    @model_validator(mode="after")
+    def _square(self) -> Self:
+        axes = np.array(self.axes)
+        if np.abs(axes @ axes.T - np.eye(2)).max() > SQUARE:
+            raise ValueError("has axes of a form that are no unit vectors at right angles")
+        return self
+
+
 class MachineFrame(Strict):
     """A position of the machine: which of the two runs, and which stop."""
 
@@ -91,6 +111,7 @@ class AsBuilt(Strict):
     shift: list[Vector] | None = Field(None, alias="shift_mm", max_length=MOST)
     # of each ball in each by its weight, in the base's frame, mm
     sag: list[list[Vector]] | None = Field(None, alias="sag_mm", max_length=MOST)
+    forms: list[MeasuredForm] | None = Field(None, max_length=MOST)  # of caps; None: spheres
     # reflecting spheres
     balls: list[MeasuredBall] = Field(alias="spheres", min_length=1, max_length=MOST)
 
@@ -103,6 +124,9 @@ class AsBuilt(Strict):
             raise ValueError("has another number of angles, turns, shifts or sags than of frames")
         if any(len(row) != len(self.balls) for row in self.sag or ()):
             raise ValueError("has another number of sags than of spheres in a frame")
+        formed = [one.ball for one in self.forms or ()]
+        if len(set(formed)) != len(formed) or max(formed, default=0) > len(self.balls):
+            raise ValueError("has two forms of a ball, or one of a ball that is not there")
         places = [(frame.turn, frame.stop) for frame in self.frames]
         if len(set(places)) != len(places):
             raise ValueError("has a frame twice")
@@ -123,15 +147,32 @@ class AsBuilt(Strict):
         number = {frame.stop: k for k, frame in enumerate(self.frames) if frame.turn == turn}
         return np.array([number.get(one, -1) for one in stop.tolist()], dtype=np.int64)
 
+    def _turn(self, frame: Ints) -> Rotation:
+        """Of the base beside its angle in frames (N,)."""
+        none = np.zeros((frame.size, 3))
+        return Rotation.from_rotvec(none if self.turn is None else np.array(self.turn)[frame])
+
+    def _about_axis(self, frame: Ints) -> Rotation:
+        angle = np.radians(np.array(self.angle_deg)[frame])
+        return Rotation.from_rotvec(angle[:, None] * self.axis)
+
+    def fronts(self, placed: Floats, ball: Ints, frame: Ints) -> Fronts:
+        """Fronts of balls (N,) whose spheres are at (3, N) in frames (N,)."""
+        count = len(self.balls)
+        half, terms, axes = np.ones(count), np.zeros((TERMS, count)), np.zeros((2, count, 3))
+        for one in self.forms or ():
+            k = one.ball - 1
+            half[k], terms[:, k], axes[:, k] = one.half, np.array(one.terms_um) / 1000, one.axes
+        turn = self._turn(frame) * self._about_axis(frame)
+        across = np.stack([turn.apply(way[ball]).T for way in axes])
+        return Fronts(placed, self.radius[ball], across, half[ball], terms[:, ball])
+
     def placed(self, centre: Floats, ball: Ints, frame: Ints) -> Floats:
         """(3, N) where balls (N,), at (3, N) on the base, are in frames (N,), mm."""
-        angle = np.radians(np.array(self.angle_deg)[frame])
         none, point = np.zeros(3), self.axis_point
         sag = none if self.sag is None else np.array(self.sag)[frame, ball]
-        rotation = Rotation.from_rotvec(angle[:, None] * self.axis)
-        placed = point + rotation.apply(centre.T + sag - point)
-        if self.turn is not None:
-            placed = Rotation.from_rotvec(np.array(self.turn)[frame]).apply(placed)
+        placed = point + self._about_axis(frame).apply(centre.T + sag - point)
+        placed = self._turn(frame).apply(placed)
         shift = none if self.shift is None else np.array(self.shift)[frame]
         return np.asarray((placed + shift).T)
 

@@ -212,8 +212,11 @@ def seat_errors(context: PrototypeContext, machine: AsBuilt) -> SeatErrors:
     """Compare the balls with the record, and solve the shims of all pads.
 
     A ball that lies on three planes moves by d where each plane is raised by n.d along its normal.
+    Another radius of a cap is one about its apex, which its seat has no part in.
     """
-    designed, found = context.prototype.balls.columns("cx", 3), machine.centre
+    balls = context.prototype.balls
+    growth = np.where(balls.cap, machine.radius - balls.radius_mm, 0.0) * balls.columns("nx", 3)
+    designed, found = balls.columns("cx", 3), machine.centre + growth
     turn, shift = _motion(designed, found)
     placed = turn.apply(designed.T).T + shift[:, None]
     off = turn.inv().apply((found - placed).T).T
@@ -221,7 +224,7 @@ def seat_errors(context: PrototypeContext, machine: AsBuilt) -> SeatErrors:
     shim = -np.einsum("kpi,ik->pk", normals, off)
     about = float(turn.as_rotvec() @ context.frame[0])
     aside = float(np.linalg.norm(turn.as_rotvec() - about * context.frame[0]))
-    return SeatErrors(off, shim, placed, about, aside, float(np.linalg.norm(shift)))
+    return SeatErrors(off, shim, placed - growth, about, aside, float(np.linalg.norm(shift)))
 
 
 def _motion(designed: Floats, found: Floats) -> tuple[Rotation, Floats]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tbcad_verify.as_built.forms import Fronts
 from tbcad_verify.as_built.machine import AsBuilt
 from tbcad_verify.errors import BadExport
 from tbcad_verify.mesh.surfaces import (
@@ -53,11 +54,17 @@ class RealTransfer:
 
     matrix: Floats  # (3, 3, m) from the shell's picture to the real camera's sight
     mirrors: PreparedSurfaces  # a ball for each mirror
+    fronts: Fronts  # of the same balls
 
     def reflected(self, mirror: Ints, d: Floats) -> tuple[Floats, ReflectedRays]:
         """Directions (3, N) of mirrors' cells as they meet the balls, and their reflections."""
         turned = rotated(self.matrix[:, :, mirror], d)
-        return turned, reflect(self.mirrors, mirror, turned)
+        return turned, self.rays(mirror, turned)
+
+    def rays(self, mirror: Ints, turned: Floats) -> ReflectedRays:
+        """Rays (3, N) of the real camera after the balls of mirrors (N,)."""
+        spheres = reflect(self.mirrors, mirror, turned)
+        return self.fronts.rays(self.mirrors.origin, mirror, turned, spheres)
 
 
 def halves(context: PrototypeContext, machine: AsBuilt) -> list[Half]:
@@ -97,14 +104,14 @@ def half_views(
     normal = unit(apex - ball)
     surfaces = prepare_for_rays(pinhole, Surfaces(apex, normal, 1 / radius))
     # Neighbours of all mirrors bound the cells, measured or not.
-    outlines, nearest = ended_on_balls(
-        RealTransfer(matrix, surfaces), cell_outlines(half.shell).take(known)
-    )
+    fronts = machine.fronts(ball, which, half.frame[known])
+    transfer = RealTransfer(matrix, surfaces, fronts)
+    outlines, nearest = ended_on_balls(transfer, cell_outlines(half.shell).take(known))
     d = np.einsum("ijm,jms->ims", matrix, outlines.direction)
     covered = outline_coverage(outlines.is_edge, nearest, d, after[0], shell.halved)
     views.coverage[known] = covered
     views.margin[known] = _least(machine.camera.frame_margin(d.reshape(3, -1)), outlines.is_edge)
-    rays = reflect(surfaces, np.repeat(np.arange(known.size), d.shape[2]), d.reshape(3, -1))
+    rays = transfer.rays(np.repeat(np.arange(known.size), d.shape[2]), d.reshape(3, -1))
     passing = norm(nearest_on_lines(pinhole[:, None], d.reshape(3, -1), 0.0, rays.reach))
     views.clearance[known] = _least(passing - context.radius, outlines.is_edge)
     return views

@@ -15,6 +15,9 @@ from tbcad_verify.record.prototype import Prototype
 from tbcad_verify.report.checks import Unknown
 from tbcad_verify.types import Bools, Floats, Ints
 
+# Of what caps are made of, g/cm^3: cured resins 1.15 to 1.2; aluminium alloys 2.70 (EN 573-3).
+CAP_DENSITIES = {"printed": 1.18, "turned": 2.70, "none": 0.0}
+
 
 @dataclass(frozen=True)
 class PrototypeContext:
@@ -97,7 +100,7 @@ class PrototypeContext:
         A cap is a ball whose front is replaced from a half angle of 45 degrees on by the flatter
         sphere; where the front is not flatter, nothing is replaced. By revolution about the normal.
         """
-        balls, density = self.prototype.balls, self.export.spec.printer.density_g_cm3
+        balls, density = self.prototype.balls, CAP_DENSITIES[self.export.spec.prototype.caps]
         body, front = balls.body_radius_mm, balls.radius_mm
         edge = np.minimum(np.where(body < front, body / np.sqrt(2), body), front)
         height = np.sqrt(body**2 - edge**2)  # from the body's centre, of where both spheres meet

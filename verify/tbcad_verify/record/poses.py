@@ -153,7 +153,7 @@ def _beyond_the_limits(export: Export) -> Iterator[str]:
     spec, (low, high) = export.spec.prototype, prototype.swing
     if high - low > spec.max_swing_deg:
         yield f"a swing of {high - low:.1f} deg above prototype.max_swing_deg"
-    if prototype.balls.cap.any() and not spec.caps:
+    if prototype.balls.cap.any() and spec.caps == "none":
         yield "caps without prototype.caps"
     bought = prototype.balls.diameter_mm[~prototype.balls.cap].max(initial=0)
     if bought > spec.largest_ball_mm:

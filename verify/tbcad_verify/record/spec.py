@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator
+from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapValidator
 
 from tbcad_verify.record.validation import Strict
 
@@ -21,6 +21,11 @@ def _or_auto(value: object, check: ValidatorFunctionWrapHandler) -> object:
 
 
 OR_AUTO = WrapValidator(_or_auto)
+
+
+def _cap_making(value: object) -> object:
+    """Words as they are; true and false of exports from before there were words."""
+    return {True: "printed", False: "none"}[value] if isinstance(value, bool) else value
 
 
 class OpticsSpec(Strict):
@@ -183,7 +188,7 @@ class PrototypeSpec(Strict):
 
     k: Annotated[int, Field(ge=1, le=1000), OR_AUTO]
     picture: Literal["moved", "fixed"]
-    caps: bool
+    caps: Annotated[Literal["printed", "turned", "none"], BeforeValidator(_cap_making)]
     max_swing_deg: float = Field(gt=0, le=360)
     ball_wall_mm: Annotated[float, Field(ge=0, le=50), OR_AUTO]
     largest_ball_mm: Annotated[float, Field(gt=0, le=1000), OR_AUTO]

@@ -15,8 +15,9 @@ from tbcad.core.geometry.vectors import dot
 from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
 from tbcad.core.optics.reflection import reflect
+from tbcad.core.optics.sphere_forms import FIRST, ray_reach, surface_normals
 from tbcad.light.simulate.capture.photograph import Samples, sample_shifts, to_bytes
-from tbcad.light.simulate.prototype.run import PrototypeRun
+from tbcad.light.simulate.prototype.run import SPHERES, PrototypeRun
 from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
 from tbcad.light.simulate.scene.rays import within_walls
 from tbcad.types import Bools, Bytes, Colours, Floats, Ints
@@ -72,9 +73,16 @@ def _reflected(
     """Rays after the balls (n,), from 1, that they meet at distances (n,): of these the rows."""
     on = ball > 0
     origin, reflected = np.zeros_like(direction), np.zeros_like(direction)
+    made = on & sphere[:, SPHERES : SPHERES + FIRST].any(axis=1)  # with a form
+    centre, radius, form = sphere[:, :3], sphere[:, 3], sphere[:, SPHERES:]
+    if made.any():
+        shapes = centre[made], radius[made], form[made]
+        distance[made] = ray_reach(pinhole, direction[made], shapes, distance[made])
     origin[on] = pinhole + distance[on, None] * direction[on]
-    normal = (origin[on] - sphere[on, :3]) / sphere[on, 3:4]
-    reflected[on] = reflect(direction[on], normal)
+    normal = (origin - centre) / radius[:, None]
+    if made.any():
+        normal[made] = surface_normals(centre[made], origin[made], form[made])
+    reflected[on] = reflect(direction[on], normal[on])
     return BallHits(ball, origin, reflected, distance)
 
 

@@ -17,6 +17,7 @@ from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import LensCamera, without_distortion
 from tbcad.core.optics.reflection import reflection_points
+from tbcad.core.optics.sphere_forms import turned_axes
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import (
@@ -33,6 +34,7 @@ from tbcad.types import Floats, Ints
 ROUNDING_MM = 1e-6
 APEX, NORMAL = "px py pz", "nx ny nz"
 ERROR_DEG = 1e-6
+SPHERES = 8  # columns of `PrototypeRun.balls` before a form
 HALF_TURN = np.array([-1.0, -1.0, 1.0])
 """Factors that turn points and vectors by 180 degrees about z."""
 
@@ -58,6 +60,8 @@ class Plan:
     # whether balls are ended by walls, so that a pixel of one never shows another: those of a shell
     # with mirrors on pedestals
     parted: bool = False
+    # radius of the part of a cap in use, mm, (k,); 0 of balls. None: there are no caps
+    half_aperture: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.radius)
@@ -94,6 +98,7 @@ def read_plan(exported: ExportedDesign) -> Plan:
         angle=np.radians(_angles(plan_file, pictures)),
         ball=ball.astype(np.int64),
         stop=stop.astype(np.int64),
+        half_aperture=_half_apertures(record, document, len(balls)),
     )
     _check_errors(plan_file, error_deg, plan, exported)
     return plan
@@ -130,6 +135,15 @@ def _check_balls(path: Path, balls: list[BallRow]) -> None:
     for wrong, what in faults:
         if wrong.any():
             raise InputError(f"{path}: ball {int(np.argmax(wrong)) + 1} {what}: {REBUILD}")
+
+
+def _half_apertures(path: Path, document: Prototype, balls: int) -> Floats:
+    half = np.zeros(balls)
+    for cap in document.caps:
+        if not 1 <= cap.ball <= balls or cap.aperture_mm <= 0:
+            raise InputError(f"{path}: cap {cap.ball} has no ball or aperture: {REBUILD}")
+        half[cap.ball - 1] = cap.aperture_mm / 2
+    return half
 
 
 def _angles(path: Path, pictures: list[PictureRow]) -> Floats:
@@ -202,7 +216,8 @@ class PrototypeRun:
     reflector: Reflector  # the shell's camera and mirrors, whose picture is composed
     camera: LensCamera  # that takes the photographs
     # at each stop: centre and radius of the reflecting sphere, centre and radius of the sphere in
-    # the seat, mm, (s, k, 8)
+    # the seat, mm, (s, k, 8), and then the form of the first, if any has one
+    # (tbcad.core.optics.sphere_forms)
     balls: Floats
     stop: Ints  # whose photograph shows the ball in place of each mirror, (m,)
     ball: Ints  # in place of each mirror, (m,)
@@ -239,7 +254,13 @@ def prototype_run(
     `half` is 0 for camera a's mirrors, 1 for camera b's, the object turned.
     """
     flip = HALF_TURN if half else np.ones(3)
-    balls = balls * np.concatenate([flip, [1.0], flip, [1.0]])
+    balls = np.concatenate(
+        [
+            balls[..., :SPHERES] * np.concatenate([flip, [1.0], flip, [1.0]]),
+            *([turned_axes(balls[..., SPHERES:], flip)] if balls.shape[-1] > SPHERES else []),
+        ],
+        axis=-1,
+    )
     camera = replace(camera, pinhole=camera.pinhole * flip, axes=camera.axes * flip)
     ball, stop = plan.ball[half], plan.stop[half]
     centre, radius = balls[stop, ball, :3], balls[stop, ball, 3]
@@ -264,21 +285,29 @@ def prototype_run(
 
 
 def balls_at_stops(
-    plan: Plan, centre: Floats, radius: Floats, place: Callable[[Floats], Floats]
+    plan: Plan,
+    centre: Floats,
+    radius: Floats,
+    place: Callable[[Floats], Floats],
+    forms: Floats | None = None,
 ) -> Floats:
     """Balls as of `PrototypeRun`, (s, k, 8), from spheres (k, 3), (k,) at base angle zero, mm.
 
     The plan says where the sphere in the seat is, from the reflecting one, and how much larger;
-    `place` moves points of the base (s, k, 3) from angle zero to the stops.
+    `place` moves points of the base (s, k, 3) from angle zero to the stops. Forms there,
+    (s, k, FORM_COLUMNS), follow the spheres.
     """
     shape = (len(plan.angle), len(plan))
+    # A ball is its own body; of a cap only the front is flatter or steeper, about its apex.
+    growth = np.where(plan.body_radius < plan.radius, radius - plan.radius, 0.0)
+    behind = plan.body_centre - plan.centre + growth[:, None] * plan.normal
     front, body = (
-        place(np.broadcast_to(points, (*shape, 3)))
-        for points in (centre, centre + plan.body_centre - plan.centre)
+        place(np.broadcast_to(points, (*shape, 3))) for points in (centre, centre + behind)
     )
-    body_radius = radius + (plan.body_radius - plan.radius)
+    body_radius = radius - growth + (plan.body_radius - plan.radius)
     radii = [np.broadcast_to(one, shape)[..., None] for one in (radius, body_radius)]
-    return np.concatenate([front, radii[0], body, radii[1]], axis=2)
+    more = [] if forms is None else [forms]
+    return np.concatenate([front, radii[0], body, radii[1], *more], axis=2)
 
 
 def ball_reflector(run: PrototypeRun) -> SubstitutedReflector:

@@ -72,7 +72,8 @@ def expected_highlights(machine: Machine, dome: float) -> Expected:
     camera = machine.camera
     shape = len(machine.angle), len(machine.radius), len(machine.leds)
     frame, sphere, led = (index.ravel() for index in np.indices(shape))
-    centre, place = machine.centres(frame, sphere), machine.leds[led]
+    place = machine.leds[led]
+    centre = machine.reflecting_centres(frame, sphere, place)
     image = dome_images(camera, centre, machine.radius[sphere], place, dome)
     size = np.array([camera.width_px, camera.height_px])
     ahead = camera.shows(image.direction)

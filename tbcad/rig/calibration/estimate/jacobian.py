@@ -5,9 +5,14 @@ a and b toward light and pinhole: the part of a + b square to n is zero. Differe
 with A = (1 - a a^T) / |L - P|, B = (1 - b b^T) / |O - P|, T = 1 - n n^T and g = n . (a + b),
 
     (r T (A + B) T + g) dn = T (A dL + B dO - (A + B) (dc + n dr)).
+
+A sphere with a form of height h (tbcad.core.optics.sphere_forms) is there as the sphere that
+touches it: r n is the tangential displacement q of the point, and the normal turns by q / r - H q
+with the second derivatives H of h, so that g becomes g (1 - r H). A gradient of h that is larger
+by e turns the normal by -e, and moves the point by K^-1 g e, with K that matrix over r.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -15,6 +20,7 @@ from scipy.sparse import csr_array
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import LensCamera, distorted
 from tbcad.core.optics.reflection import reflection_points
+from tbcad.core.optics.sphere_forms import bends, effective_centres, heights, term_heights
 from tbcad.rig.calibration.estimate.parameters import (
     Block,
     Of,
@@ -43,10 +49,16 @@ class Reflections:
     by_radius: Floats  # (n, 3)
     by_light: Floats  # (n, 3, 3)
     by_pinhole: Floats  # (n, 3, 3)
+    by_slope: Floats  # by the gradient of a form's height, mm, (n, 3, 3)
 
 
-def reflections(centre: Floats, radius: Floats, light: Floats, pinhole: Floats) -> Reflections:
-    """Where spheres (n,) show lights (n, 3) to a pinhole (3,), all in mm."""
+def reflections(
+    centre: Floats, radius: Floats, light: Floats, pinhole: Floats, bend: Floats | None = None
+) -> Reflections:
+    """Where spheres (n,) show lights (n, 3) to a pinhole (3,), all in mm.
+
+    They may touch surfaces there whose forms have second derivatives, 1/mm, (n, 3, 3).
+    """
     start = reflection_points(centre, radius, light, pinhole, START_ITERATIONS)
     normal = unit(start - centre)
     for _ in range(ITERATIONS):
@@ -60,14 +72,19 @@ def reflections(centre: Floats, radius: Floats, light: Floats, pinhole: Floats) 
             break
     (by_light, by_pinhole), turned, _ = _law(centre, radius, light, pinhole, normal)
     across = np.eye(3) - normal[:, :, None] * normal[:, None]
+    point = centre + radius[:, None] * normal
+    along = dot(normal, unit(light - point) + unit(pinhole - point))[:, None, None]
+    if bend is not None:
+        turned = turned - along * radius[:, None, None] * across @ bend @ across
     moved = radius[:, None, None] * np.linalg.solve(turned, across)
     with_point = np.eye(3) - moved @ (by_light + by_pinhole)
     return Reflections(
-        point=centre + radius[:, None] * normal,
+        point=point,
         by_centre=with_point,
         by_radius=(with_point @ normal[..., None])[..., 0],
         by_light=moved @ by_light,
         by_pinhole=moved @ by_pinhole,
+        by_slope=along * moved,
     )
 
 
@@ -159,8 +176,7 @@ def light_images(
 ) -> LightImages:
     """Where spheres (n,) show lights (n, 3) in frames (n,) of the machine of these values."""
     camera = machine.camera
-    centre = machine.centres(frame, sphere)
-    seen = reflections(centre, machine.radius[sphere], light, camera.pinhole)
+    seen, formed = _seen(machine, frame, sphere, light)
     image = (seen.point - camera.pinhole) @ camera.axes.T
     pixel, by_image, by_lens = projection(camera, image)
     by_point = by_image @ camera.axes
@@ -177,5 +193,34 @@ def light_images(
         Block.DISTORTION: lens[:, :, 4:],
         Block.RADII: by_point @ seen.by_radius[..., None],
         **{block: by_point @ seen.by_centre @ value for block, value in moved.by.items()},
+        **{block: by_point @ value for block, value in formed.items()},
     }
+    if Block.POWER in by:
+        growth = prior.radius_by_power(values)[sphere, None, None]
+        by[Block.POWER] = by[Block.POWER] + growth * by[Block.RADII]
     return LightImages(pixel, by_point @ seen.by_light, Slopes(moved.of, by))
+
+
+def _seen(
+    machine: Machine, frame: Ints, sphere: Ints, light: Floats
+) -> tuple[Reflections, dict[Block, Floats]]:
+    """Points where spheres show lights, and their derivatives by what only caps have, (n, 3, c)."""
+    centre, radius, pinhole = (
+        machine.centres(frame, sphere),
+        machine.radius[sphere],
+        machine.camera.pinhole,
+    )
+    if machine.forms is None:
+        return reflections(centre, radius, light, pinhole), {}
+    form = machine.forms_in(frame, sphere)
+    touching = effective_centres(centre, radius, form, light, pinhole)
+    offset = reflection_points(touching, radius, light, pinhole) - centre
+    seen = reflections(touching, radius, light, pinhole, bends(form, offset))
+    # A larger radius takes a direction from the centre farther across the form.
+    outward = unit(offset)[..., None]
+    farther = heights(form, offset)[1][:, None] @ outward * (seen.by_centre @ outward)
+    farther = farther + seen.by_slope @ bends(form, offset) @ outward
+    seen = replace(seen, by_radius=seen.by_radius + farther[..., 0])
+    height, gradient = term_heights(form, offset)
+    by_height = (seen.by_centre @ outward) * height[:, None]
+    return seen, {Block.FORM: by_height + seen.by_slope @ gradient.swapaxes(1, 2)}

@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from tbcad.core.geometry.rotations import rotated
 from tbcad.core.geometry.vectors import norm, perpendicular_axes
+from tbcad.core.optics.sphere_forms import TERM_COUNT, power_slope, powered_radius
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Bools, Floats, Ints
 
@@ -71,6 +72,10 @@ class Block(StrEnum):
     SHIFT = "shift", Of.FRAME, 3
     # By which the spheres' sag is larger than the mean's, as a share.
     SAG = "sag", Of.MACHINE, 1
+    # Of caps: by which sagittas are larger over the part in use, the apex where it is, mm; and the
+    # terms of their forms (tbcad.core.optics.sphere_forms), mm.
+    POWER = "cap_powers", Of.SPHERE, 1
+    FORM = "cap_forms", Of.SPHERE, TERM_COUNT
 
 
 @dataclass(frozen=True)
@@ -137,7 +142,13 @@ class Prior:
         """The machine of free parameters (q,) in prior standard deviations."""
         x, mean = self.blocks(values), self.mean
         growth, slide = x[Block.CARRIER]
-        tilt = self.tilt(values)
+        tilt, forms, radius = self.tilt(values), self.mean.forms, self.powered(values)
+        # An apex stays where it is when the radius grows about it.
+        on_base = x[Block.CENTRES]
+        if forms is not None:
+            on_base = on_base - (radius - mean.radius)[:, None] * forms.outward
+            axes = np.stack([tilt.apply(forms.axes[:, i]) for i in (0, 1)], axis=1)
+            forms = replace(forms, axes=axes, terms=forms.terms + x[Block.FORM])
         ratio = x[Block.FOCAL][0] + np.array([0.5, -0.5]) * x[Block.FOCAL][1]
         camera = replace(
             mean.camera,
@@ -152,13 +163,27 @@ class Prior:
             axis=tilt.apply(mean.axis),
             axis_point=mean.axis_point + x[Block.AXIS_POINT] @ self.across,
             angle=mean.angle + x[Block.OFFSET][self.series] + x[Block.ANGLES],
-            centre=tilt.apply((1 + growth) * mean.centre + slide * mean.axis + x[Block.CENTRES]),
-            radius=mean.radius + x[Block.RADII],
+            centre=tilt.apply((1 + growth) * mean.centre + slide * mean.axis + on_base),
+            radius=radius + x[Block.RADII],
             leds=mean.leds + x[Block.LEDS],
             turn=_sum(mean.turn, x[Block.TURN] @ self.across),
             shift=_sum(mean.shift, x[Block.SHIFT] @ self.ways),
             sag=None if mean.sag is None else (1 + x[Block.SAG][0]) * mean.sag,
+            forms=forms,
         )
+
+    def powered(self, values: Floats) -> Floats:
+        """Radii of the spheres with the powers of caps, mm, (k,)."""
+        forms, power = self.mean.forms, self.blocks(values)[Block.POWER]
+        radius = self.mean.radius
+        return radius if forms is None else powered_radius(radius, forms.half_aperture, power)
+
+    def radius_by_power(self, values: Floats) -> Floats:
+        """Derivatives of the spheres' radii by the powers of caps, (k,)."""
+        forms = self.mean.forms
+        if forms is None:
+            return np.zeros(len(self.mean.radius))
+        return power_slope(self.powered(values), forms.half_aperture)
 
 
 def _sum(mean: Floats | None, more: Floats) -> Floats:
@@ -231,6 +256,10 @@ def sphere_slopes(
     ]
     placed = wobble.apply(machine.axis_point + turned)
     turns = (left_jacobian(turn) @ prior.across.T).swapaxes(1, 2)
+    by_power = {}
+    if prior.mean.forms is not None:
+        back = -prior.radius_by_power(values)[sphere, None] * prior.mean.forms.outward[sphere]
+        by_power = {Block.POWER: on_base @ back[..., None]}
     return Slopes(
         {Of.FRAME: frame, Of.SPHERE: sphere, Of.SERIES: prior.series[frame]},
         {
@@ -243,6 +272,7 @@ def sphere_slopes(
             Block.TURN: np.cross(turns, placed[:, None]).swapaxes(1, 2),
             Block.SHIFT: np.broadcast_to(prior.ways.T, (len(frame), 3, 3)),
             Block.SAG: (rotation @ sag[..., None]),
+            **by_power,
         },
     )
 
@@ -253,10 +283,13 @@ def base_slopes(prior: Prior, values: Floats) -> Slopes:
     still = replace(machine, angle=0 * machine.angle, turn=None, sag=None)
     every = np.arange(len(machine.radius))
     moved = sphere_slopes(prior, values, still, 0 * every, every)
-    by = {
+    by: dict[Block, Floats] = {
         block: np.pad(moved.by[block], ((0, 0), (0, 1), (0, 0)))
-        for block in (Block.CENTRES, Block.CARRIER, Block.TILT)
+        for block in (Block.CENTRES, Block.CARRIER, Block.TILT, Block.POWER)
+        if block in moved.by
     }
+    if Block.POWER in by:
+        by[Block.POWER][:, 3, 0] = prior.radius_by_power(values)
     by[Block.RADII] = np.broadcast_to(np.eye(4)[:, 3:], (len(every), 4, 1))
     return Slopes(moved.of, by)
 

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from tbcad.common.results import Table
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
+from tbcad.core.optics.sphere_forms import TERM_COUNT, ray_reach, surface_normals
 from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.estimate.parameters import (
     Block,
@@ -67,6 +68,7 @@ def recovered_errors(result: MachineCalibration, truth: Machine) -> tuple[Kind, 
         (BESIDES, "um", MICROMETRES, lambda one: rest @ one.centre.ravel(), besides),
         ("radii of balls", "um", MICROMETRES, lambda one: one.radius[~caps], spheres[~caps, 3]),
         ("radii of caps", "um", MICROMETRES, lambda one: one.radius[caps], spheres[caps, 3]),
+        ("forms of caps", "um", MICROMETRES, _terms, of[Block.FORM]),
         (
             *("base angles", "deg", 1.0),
             lambda one: np.degrees(one.angle),
@@ -149,6 +151,12 @@ def _middle_sigmas(found: Estimate) -> Floats:
     return np.asarray(np.sqrt(np.diagonal(known, axis1=1, axis2=2)))
 
 
+def _terms(machine: Machine) -> Floats:
+    """Terms of the spheres' forms, mm, (k, t)."""
+    none = np.zeros((len(machine.radius), TERM_COUNT))
+    return none if machine.forms is None else machine.forms.terms
+
+
 def _lens(machine: Machine) -> Floats:
     """As the parameters of a lens are: see Prior."""
     camera = machine.camera
@@ -195,8 +203,15 @@ def traced(machine: Machine, pixel: Floats, frame: Ints, sphere: Ints) -> tuple[
     offset = centre - camera.pinhole
     along = dot(ray, offset)
     inside = radius**2 - dot(offset, offset) + along**2
-    point = camera.pinhole + (along - np.sqrt(inside))[:, None] * ray
-    return point, reflected_rays(camera.pinhole, point, unit(point - centre))
+    reach = along - np.sqrt(inside)
+    if machine.forms is not None:
+        form = machine.forms_in(frame, sphere)
+        reach = ray_reach(camera.pinhole, ray, (centre, radius, form), reach)
+    point = camera.pinhole + reach[:, None] * ray
+    normal = unit(point - centre)
+    if machine.forms is not None:
+        normal = surface_normals(centre, point, form)
+    return point, reflected_rays(camera.pinhole, point, normal)
 
 
 def centre_pixels(machine: Machine, frame: Ints, sphere: Ints) -> Floats:
