@@ -14,7 +14,7 @@ from tbcad.core.spec.errors import SpecError, short_text
 from tbcad.errors import InputError
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.purchased.parts import Parts, Price, Prices
+from tbcad.prototype.purchased.parts import Parts, Price, Prices, PurchasedPart
 
 # A body, a number with its part, and a letter of its form, such as "DIN 705 A" or "ISO 3290-1".
 STANDARD = re.compile(r"\b(?:ISO|DIN|EN|IEC|ASME|ANSI) (?:[A-Z]+)?\d+(?:[.-]\d+)*(?: [A-Z](?= ))?")
@@ -89,6 +89,21 @@ def bom_rows(
     return [{"item": item, **row} for item, row in enumerate(rows, 1)]
 
 
+def list_rows(
+    bought: Iterable[tuple[PurchasedPart, int]],
+    printed: Mapping[PrintedItem, int],
+    density: float,
+    prices: Prices,
+) -> list[Row]:
+    """The rows of a list by itself: what is bought, then what is printed of a density (g/cm^3)."""
+    rows = [
+        _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
+        for part, quantity in bought
+    ]
+    rows += [_printed(item, density, prices, quantity) for item, quantity in printed.items()]
+    return [{"item": item, **row} for item, row in enumerate(rows, 1)]
+
+
 def cap_item(
     prototype: PrototypeLayout, j: int, volume: float, estimate: tuple[float, float]
 ) -> PrintedItem:
@@ -143,17 +158,17 @@ def _bought(part: str, what: str, quantity: int, material: str, mass: float, pri
     return {**row, **price_columns(quantity, prices.of(part, mass)), "from": BOUGHT}
 
 
-def _printed(item: PrintedItem, density: float, prices: Prices) -> Row:
+def _printed(item: PrintedItem, density: float, prices: Prices, quantity: int = 1) -> Row:
     """Its mass is that of a solid print, and its price that of its filament."""
     filament_mm3, hours = item.estimate
     filament = filament_mm3 / MM3_PER_CM3 * density
     mass = item.volume / MM3_PER_CM3 * density
     return {
-        **_row(item.name, item.what, 1, item.material, mass),
+        **_row(item.name, item.what, quantity, item.material, mass),
         "print_volume_mm3": round(item.volume),
         "filament_g": _estimate(filament),
         "print_hours": _estimate(hours),
-        **price_columns(1, prices.of(item.material, filament)),
+        **price_columns(quantity, prices.of(item.material, filament)),
         "from": PRINTED,
     }
 
