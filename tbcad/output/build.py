@@ -28,7 +28,7 @@ from tbcad.shell.files import (
     write_shell_meshes,
     write_shell_solids,
 )
-from tbcad.shell_lamps.files import ring_record, write_ring
+from tbcad.shell_lamps.files import printed_ring, ring_record, write_ring
 from tbcad.shell_lamps.ring import lamp_ring
 from tbcad.types import Progress
 
@@ -67,11 +67,13 @@ def write_export(
     # Refused before anything is written.
     mandrel = design_mandrel(design) if design.spec.shell.negative and SHELL in parts else None
     export = Export(design.spec, tuple(part for part in PARTS if part in parts))
-    ring = lamp_ring(design, load_parts()) if SHELL in parts else None
+    ring, lamps = lamp_ring(design, load_parts()) if SHELL in parts else None, None
     if SHELL in parts:
         envelope = shell_envelope(design)  # refuses flanges that do not fit
         if ring:
-            submit_file(write_ring, design, ring, folder)
+            part = printed_ring(ring, design.spec.printer)
+            lamps = ring_record(ring, part, design)
+            submit_file(write_ring, design.spec, ring, part, folder)
         submit_file(write_shell_meshes, design, envelope, folder)
         if PROTOTYPE in parts:
             submit_file(write_shell_solids, design, envelope, folder)
@@ -102,7 +104,6 @@ def write_export(
         )
         export = replace(export, note="; ".join(filter(None, (export.note, undercut))))
     mandrels = [mandrel_record(array, mandrel) for array in design.arrays if mandrel]
-    lamps = ring_record(ring, design) if ring else None
     write_record(folder, replace(design, spec=export.spec), SHELL in parts, mandrels, lamps)
     progress("manifest")
     write_manifest(folder, "build")

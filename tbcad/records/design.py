@@ -7,6 +7,7 @@ from pydantic import Field
 from tbcad.cad.formats.checked_files import Finite, Vector
 from tbcad.core.spec.design import Spec
 from tbcad.records.document import Document, RecordSection
+from tbcad.records.prototype import PrintedPartRecord
 
 NAME = "design.json"
 MISSING = "name a folder that tbcad build wrote"
@@ -50,9 +51,11 @@ class LampRecord(RecordSection):
 
 
 class ShellLamps(RecordSection):
-    """LEDs on the lenses of a shell's cameras, and the files of the ring that carries them.
+    """LEDs on the lenses of a shell's cameras, and the ring that carries those of each.
 
     Attributes:
+        ring: in a frame of its own, whose axes are a camera's `right`, up in its picture, and
+            backward; the middle of the face is the origin.
         led: as in the list of parts.
         emitter_mm: width of what shines.
         candela: of one, along its direction.
@@ -61,10 +64,7 @@ class ShellLamps(RecordSection):
         lux: least, mean and greatest on surfaces of the object that face all ways.
     """
 
-    name: str
-    step: str
-    stl: str
-    threemf: str = Field(alias="3mf")
+    ring: PrintedPartRecord
     led: str
     emitter_mm: float = Field(gt=0, le=100)
     candela: float = Field(gt=0, le=1e6)

@@ -5,7 +5,9 @@ from pathlib import Path
 
 from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.spec.design import PrinterSpec, Spec
 from tbcad.prototype.files import bom
+from tbcad.prototype.files.record import part_record
 from tbcad.prototype.files.write import write_part
 from tbcad.prototype.printed import PrintedPart, placed_component
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, load_parts, load_prices
@@ -13,7 +15,7 @@ from tbcad.records.design import LampRecord, ShellLamps
 from tbcad.records.tables import WiringRow
 from tbcad.shell_lamps.ring import INSERT, SCREWS, SET_SCREW, SUPPLY_V, LampRing
 
-NAME, LIST, WIRING = "lamp_ring", "lamp_list.csv", "lamp_wiring.csv"
+LIST, WIRING = "lamp_list.csv", "lamp_wiring.csv"
 RINGS = 2
 WIRE, CABLE, WIRE_M, CABLE_M = "WIRE-28", "CABLE-2x0.25", 1, 2  # metres of a ring
 ALWAYS = {"SUPPLY-24V": 1, "FUSE-2A": 1, "GLUE-EPOXY": 1}
@@ -21,14 +23,18 @@ WIRING_MM = 1000.0  # of a ring's cable to the supply
 MESH_MM = 0.02
 
 
-def write_ring(design: MirrorDesign, ring: LampRing, folder: Path) -> None:
-    """Write the ring and its lists into a folder.
+def printed_ring(ring: LampRing, printer: PrinterSpec) -> PrintedPart:
+    """The ring as it is printed, face down.
 
     SpecError: it does not fit on the printer's bed; InvalidSolidError: the kernel fails.
     """
-    spec, parts = design.spec, load_parts()
-    solid = placed_component(ring.component(), spec.printer, MESH_MM)
-    part = PrintedPart(solid, "frame", "ring of LEDs round a camera's lens")
+    component = ring.component()
+    return PrintedPart(placed_component(component, printer, MESH_MM), "frame", component.what)
+
+
+def write_ring(spec: Spec, ring: LampRing, part: PrintedPart, folder: Path) -> None:
+    """Write the ring and its lists into a folder."""
+    parts = load_parts()
     estimate = write_part(folder, part, spec)
     item = bom.PrintedItem(part.name, part.what, part.solid.volume, estimate)
     prices = load_prices(spec.prototype.prices)
@@ -70,7 +76,7 @@ def wiring_rows(ring: LampRing) -> list[Row]:
     ]
 
 
-def ring_record(ring: LampRing, design: MirrorDesign) -> ShellLamps:
+def ring_record(ring: LampRing, part: PrintedPart, design: MirrorDesign) -> ShellLamps:
     """What design.json says of the lamps."""
     places = [
         LampRecord(
@@ -82,7 +88,7 @@ def ring_record(ring: LampRing, design: MirrorDesign) -> ShellLamps:
         for place in ring.places(array.camera)
     ]
     return ShellLamps(
-        **{"name": NAME, "step": f"{NAME}.step", "stl": f"{NAME}.stl", "3mf": f"{NAME}.3mf"},
+        ring=part_record(part, RINGS),
         led=ring.led.name,
         emitter_mm=ring.led["emitter_mm"],
         candela=ring.candela,

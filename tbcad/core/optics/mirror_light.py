@@ -47,8 +47,9 @@ class LitMirrors:
 def lit_mirrors(mirrors: Surfaces, side: float, foot: float) -> LitMirrors:
     """Spherical mirrors as lamps are reflected in them."""
     count = min(NEIGHBOURS, len(mirrors) - 1)
-    nearest = cKDTree(mirrors.apex).query(mirrors.apex, count + 1)[1][:, 1:]
-    return LitMirrors(mirrors.centre, mirrors.radius, nearest, side, foot)
+    _, nearest = cKDTree(mirrors.apex).query(mirrors.apex, count + 1)
+    others = np.asarray(nearest)[:, 1:]
+    return LitMirrors(mirrors.centre, mirrors.radius, others, side, foot)
 
 
 @compiled_loop

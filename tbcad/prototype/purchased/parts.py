@@ -18,7 +18,17 @@ from tbcad.core.spec.errors import SpecError, short_text
 COMMON_COLUMNS = ("part", "what", "material", "mass_g")
 KINDS = (
     *("motors", "stages", "wheels", "belts", "couplings", "shafts", "bearings", "screws"),
-    *("setscrews", "inserts", "dowels", "magnets", "leds", "strips", "stars", "sheets", "resistors"),
+    *(
+        "setscrews",
+        "inserts",
+        "dowels",
+        "magnets",
+        "leds",
+        "strips",
+        "stars",
+        "sheets",
+        "resistors",
+    ),
     *("wires", "connectors", "electronics", "extrusions", "tnuts", "nuts", "washers"),
     *("collars", "plates"),
 )

@@ -44,7 +44,9 @@ KINDS = {"stl": ".stl", "step": ".step", "threemf": ".3mf"}  # files that every 
 # Written after the manifest; report.html shows what a verification found, and is no part.
 OWN_FILES = frozenset({"manifest.json", NAME, "report.html"})
 # What a person reads, and no machine: its owner may edit it. Drawings keep their paper's size.
-PAPER_FILES = ("bom.csv", "wiring.csv", "camera.json", "*.pdf")
+PAPER_FILES = (
+    *("bom.csv", "wiring.csv", "camera.json", "lamp_list.csv", "lamp_wiring.csv", "*.pdf"),
+)
 MANIFEST = (("manifest", "manifest.json", "wrong files"), PAPER, ("other files", "", "files"))
 TOPOLOGY = {
     "watertight": "bad edges",
