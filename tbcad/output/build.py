@@ -20,6 +20,7 @@ from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
 from tbcad.prototype.files.write import export_prototype
 from tbcad.prototype.purchased.parts import load_parts
+from tbcad.records.design import ShellLamps
 from tbcad.shell.files import (
     design_mandrel,
     mandrel_record,
@@ -67,13 +68,10 @@ def write_export(
     # Refused before anything is written.
     mandrel = design_mandrel(design) if design.spec.shell.negative and SHELL in parts else None
     export = Export(design.spec, tuple(part for part in PARTS if part in parts))
-    ring, lamps = lamp_ring(design, load_parts()) if SHELL in parts else None, None
+    lamps = None
     if SHELL in parts:
         envelope = shell_envelope(design)  # refuses flanges that do not fit
-        if ring:
-            part = printed_ring(ring, design.spec.printer)
-            lamps = ring_record(ring, part, design)
-            submit_file(write_ring, design.spec, ring, part, folder)
+        lamps = _lamps(design, folder, submit_file)
         submit_file(write_shell_meshes, design, envelope, folder)
         if PROTOTYPE in parts:
             submit_file(write_shell_solids, design, envelope, folder)
@@ -108,3 +106,15 @@ def write_export(
     progress("manifest")
     write_manifest(folder, "build")
     return export
+
+
+def _lamps(
+    design: MirrorDesign, folder: Path, submit: Callable[..., Future[Any]]
+) -> ShellLamps | None:
+    """Write the ring of a shell's lamps; what design.json says of them, None without any."""
+    ring = lamp_ring(design, load_parts())
+    if ring is None:
+        return None
+    part = printed_ring(ring, design.spec.printer)
+    submit(write_ring, design.spec, ring, part, folder)
+    return ring_record(ring, part, design)

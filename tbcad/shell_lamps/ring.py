@@ -34,12 +34,14 @@ NUMBER = 6  # of LEDs, if nothing else is asked for: one string of them on 24 V
 SUPPLY_V = 24.0
 BORE_MM, FRONT_MM = 60.0, 10.0  # where no camera is known
 PLAY_MM = 0.5  # of the barrel in the bore, on the diameter
-COLLAR_MM, COLLAR_WALL_MM = 14.0, 6.5  # height and wall round the barrel: inserts are 5.7 mm long
+COLLAR_MM, COLLAR_WALL_MM = 14.0, 7.5  # height and wall round the barrel: inserts are 5.7 mm long
 FACE_MM = 1.6  # thickness of the face: LEDs on their boards are 2 mm high
 RIM_MM, RIM_WALL_MM = 6.0, 1.6  # height and wall of the outer rim
 BOARD_PLAY_MM = 0.5  # beside a board
 WINDOW_MM = 4.0  # radius of a window
 SCREWS, SCREW_Z_MM = 3, 9.0  # set screws, and their height over the face
+INSERT_HOLE_MM = 4.0  # diameter
+FLAT_MM, FLAT_HALF_MM = 0.8, 3.0  # depth and half width of flats at the ends of their holes
 NOTCH_MM = 6.0  # width of the cable's way through the rim
 VIEW_SHARE = 0.9  # of the bore that the camera's view may fill
 APART_MM = 2.0  # between rings, and from the shell
@@ -112,10 +114,16 @@ class LampRing:
         return np.asarray(radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1))
 
     def _screws(self, inner: float, collar: float) -> list[Primitive]:
-        """Holes of the inserts through the collar, from inside; the first is opposite the notch."""
-        ways = self._round(even_angles(SCREWS) + math.pi, 1.0)
-        start, end = (radius * ways + SCREW_Z_MM * UP for radius in (inner - 1, collar + 1))
-        return [cylinder_between(a, b, 2.0) for a, b in zip(start, end, strict=True)]
+        """Holes of the inserts through the collar, between flats; the first is opposite x."""
+        removed: list[Primitive] = []
+        for way in self._round(even_angles(SCREWS) + math.pi, 1.0):
+            axes = np.stack([way, np.cross(UP, way), UP])
+            for near, far in ((inner - 1, inner + FLAT_MM), (collar - FLAT_MM, collar + 1)):
+                low = near, -FLAT_HALF_MM, SCREW_Z_MM - FLAT_HALF_MM
+                removed.append(box(low, (far, FLAT_HALF_MM, COLLAR_MM + 1), axes))
+            start, end = ((radius * way + SCREW_Z_MM * UP) for radius in (inner, collar))
+            removed.append(cylinder_between(start, end, INSERT_HOLE_MM / 2))
+        return removed
 
     def _notch(self) -> Primitive:
         low = (self.outer - 2 * RIM_WALL_MM, -NOTCH_MM / 2, FACE_MM + 1)

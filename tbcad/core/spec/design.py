@@ -130,7 +130,7 @@ class ShellLampsSpec(Section):
 
     leds: Annotated[int, OR_AUTO] = Field(AUTO, ge=0, le=24)
     """LEDs on each ring; 0: no lamps; auto: 6, or 0 where the rings have no room."""
-    lens_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=5, le=200)
+    lens_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=20, le=200)
     """Diameter of the lens's barrel that a ring is clamped on; auto: that of the prototype's camera
     (prototype.frame.camera), or 60 where none is known."""
     front_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=-100, le=100)

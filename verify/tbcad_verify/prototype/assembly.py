@@ -5,7 +5,7 @@ Purchased parts have no file of their own. Their shapes are taken from the assem
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 

@@ -127,8 +127,8 @@ def _verify_shells(
     sink: ResultSink,
 ) -> None:
     sink(Results(stages=[MESHES]))
-    first = len(facets) - len(export.rings)
-    negatives, rings = facets[len(export.parts) : first], facets[first:]
+    last = len(facets) - len(export.rings)
+    negatives, rings = facets[len(export.parts) : last], facets[last:]
     shells = _measure_shells(export, facets[: len(export.parts)], sink)
     facets.clear()  # half of the memory
 

@@ -182,7 +182,7 @@ def _part_files(name: CheckName, export: Export) -> Check:
     """Every part has a mesh, a solid and a 3MF, all called as it is."""
     wrong = [
         f"{part.name} has {getattr(part, kind) or 'none'} for {part.name}{suffix}"
-        for part in (*export.parts, *export.mandrels, *export.printed)
+        for part in (*export.parts, *export.mandrels, *export.printed, *export.rings)
         for kind, suffix in KINDS.items()
         if getattr(part, kind) != part.name + suffix
     ]

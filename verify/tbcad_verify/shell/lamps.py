@@ -23,6 +23,7 @@ from tbcad_verify.mesh.surfaces import (
 )
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.record.export import Camera, ShellLamps
+from tbcad_verify.record.spec import AUTO, ShellLampsSpec
 from tbcad_verify.report.checks import (
     Check,
     CheckName,
@@ -48,6 +49,7 @@ LOWEST = -np.sin(np.radians(60.0))
 ROWS = 4  # one row of pixels of so many is followed for glare
 GLARE = 0.5  # % of the pixels in use
 PLACE_MM = 0.1  # of an LED from the ring's face, across and along
+PLAY_MM = 1.0  # of the lens in the ring, on the diameter
 CLEAR_MM = 3.0  # round an LED's axis nothing of the ring is nearer
 LIFT_MM = 1e-3
 CHECKS = {
@@ -91,13 +93,25 @@ class ShellLight:
 
 def _ring(name: CheckName, light: ShellLight) -> Check:
     """The ring leaves every LED free, holds it, and is out of its camera's view."""
-    cameras = light.setup.export.cameras
-    faults = [
-        fault
-        for key in sorted(cameras)
-        for fault in ring_faults(light.lamps, light.ring, cameras[key])
-    ]
+    export = light.setup.export
+    faults = asked_faults(export.spec.shell.lamps, light.lamps, light.ring)
+    for camera in light.setup.cameras:
+        faults += ring_faults(light.lamps, light.ring, camera)
     return no_faults(name, faults)
+
+
+def asked_faults(asked: ShellLampsSpec, lamps: ShellLamps, ring: Mesh) -> list[str]:
+    """In what the rings are not what the design asks for, where it has no "auto"."""
+    each = [sum(one.camera == key for one in lamps.places) for key in ("a", "b")]
+    play = 2 * float(np.hypot(*ring.points[:, :2].T).min())
+    faults = []
+    if asked.leds not in (AUTO, *each) or each[0] != each[1]:
+        faults.append(f"{each[0]} and {each[1]} LEDs, the spec asks for {asked.leds}")
+    if asked.lens_mm != AUTO and not 0 <= play - asked.lens_mm <= PLAY_MM:
+        faults.append(f"a bore of {play:.2f} mm for a lens of {asked.lens_mm:g}")
+    if asked.front_mm not in (AUTO, lamps.front_mm):
+        faults.append(f"{lamps.front_mm:g} mm before the pinholes, not {asked.front_mm:g}")
+    return faults
 
 
 def ring_faults(lamps: ShellLamps, ring: Mesh, camera: Camera) -> list[str]:
