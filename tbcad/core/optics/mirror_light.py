@@ -58,8 +58,8 @@ def reflection(centre: Vector, radius: float, lamp: Vector, place: Vector) -> tu
 
     That is the area that a unit of solid angle of the lamp falls on, across the ray. With the
     curvatures 1/s + 2/(r cos i) in the plane of incidence and 1/s + 2 cos i/r across it, of light
-    that has gone s from the lamp, it is s^2 (1 + t c1) (1 + t c2) after t more. The point is found
-    as by `tbcad.core.optics.reflection.reflection_points`.
+    that has gone s from the lamp, it is s^2 (1 + t c1) (1 + t c2) after t more; infinite in the
+    sphere's shadow. The point is found as by `tbcad.core.optics.reflection.reflection_points`.
     """
     normal = unit(minus(lamp, centre))
     for _ in range(STEPS):
@@ -68,6 +68,9 @@ def reflection(centre: Vector, radius: float, lamp: Vector, place: Vector) -> tu
         s, t = np.sqrt(dot(to_lamp, to_lamp)), np.sqrt(dot(to_place, to_place))
         bisector = plus_scaled(divided(to_lamp, s), 1 / t, to_place)
         normal = unit(plus_scaled(unit(bisector), radius / 2 * (1 / s + 1 / t), normal))
+    outward = minus(point, centre)
+    if dot(outward, to_lamp) <= 0 or dot(outward, to_place) <= 0:
+        return point, np.inf
     cosine = dot(normal, to_lamp) / s
     within, aside = 1 / s + 2 / (radius * cosine), 1 / s + 2 * cosine / radius
     return point, s**2 * (1 + t * within) * (1 + t * aside)
@@ -117,7 +120,7 @@ def _reflected_light(
                 way, back = minus(point, lamp), minus(point, place)
                 leaves = dot(way, vector(lamps[j], 3))
                 meets = dot(back, normal)
-                if leaves <= 0 or meets <= 0 or not spread > 0:
+                if leaves <= 0 or meets <= 0 or spread == np.inf:
                     continue
                 if not _in_cell(i, point, spheres, neighbours, ends):
                     continue

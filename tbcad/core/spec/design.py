@@ -128,7 +128,7 @@ class FootFlangeSpec(FlangeSpec):
 class ShellLampsSpec(Section):
     """A ring of LEDs on each camera's lens: the mirrors throw their light onto the object."""
 
-    leds: Annotated[int, OR_AUTO] = Field(AUTO, ge=0, le=24)
+    leds: Annotated[int, OR_AUTO] = Field(AUTO, ge=0, le=8)
     """LEDs on each ring; 0: no lamps; auto: 6, or 0 where the rings have no room."""
     lens_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=20, le=200)
     """Diameter of the lens's barrel that a ring is clamped on; auto: that of the prototype's camera

@@ -75,7 +75,7 @@ class FlangeSpec(Strict):
 class ShellLampsSpec(Strict):
     """Rings of LEDs on the lenses of a shell's cameras."""
 
-    leds: Annotated[int, Field(ge=0, le=24), OR_AUTO] = 0
+    leds: Annotated[int, Field(ge=0, le=8), OR_AUTO] = 0
     lens_mm: Annotated[float, Field(ge=20, le=200), OR_AUTO] = AUTO
     front_mm: Annotated[float, Field(ge=-100, le=100), OR_AUTO] = AUTO
 
