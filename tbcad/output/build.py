@@ -11,7 +11,7 @@ from tbcad_verify.run.processes import at_once
 
 from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.common.schedule import Submit
-from tbcad.core.camera.sheet import write_camera_sheet
+from tbcad.core.camera.sheet import RigLight, write_camera_sheet
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.spec.design import Spec
@@ -78,7 +78,11 @@ def write_export(
         else:
             write_shell_solids(design, envelope, folder, progress)
     # The prototype's light and mount are in its own, which replaces it.
-    write_camera_sheet(folder, design.arrays[0], design.spec.optics.capture_diameter_mm / 2)
+    light, radius = (
+        RigLight(lamps.lux[1] if lamps else None),
+        design.spec.optics.capture_diameter_mm,
+    )
+    write_camera_sheet(folder, design.arrays[0], radius / 2, light)
     if PROTOTYPE in parts:
         try:
             export = replace(export, spec=export_prototype(design, folder, progress, submit_file))
