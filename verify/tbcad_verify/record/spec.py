@@ -76,8 +76,8 @@ class ShellLampsSpec(Strict):
     """Rings of LEDs on the lenses of a shell's cameras."""
 
     leds: Annotated[int, Field(ge=0, le=8), OR_AUTO] = 0
-    lens_mm: Annotated[float, Field(ge=20, le=200), OR_AUTO] = AUTO
-    front_mm: Annotated[float, Field(ge=-100, le=100), OR_AUTO] = AUTO
+    lens_mm: Annotated[float, Field(ge=20, le=200), OR_AUTO] = 60.0
+    front_mm: Annotated[float, Field(ge=-100, le=100), OR_AUTO] = 0.0
 
 
 class ShellSpec(Strict):
