@@ -139,6 +139,9 @@ class CaptureOptions(Call):
         "Mirrors of the record (spheres), of the exported meshes, or the balls of the prototype, "
         "stop by stop.",
     ] = "spheres"
+    own_light: bool = False
+    """Light the object by the shell's own lamps and through its mirrors, in place of the built-in
+    light; the prototype's balls are always lit by its lamps."""
     lights: Annotated[AnyPath | None, typer.Option(metavar="FILE")] = None
     """Also write a reflectance field, a photograph for each lamp: FILE is a table with the columns
     x_mm,y_mm,z_mm; the word mirrors is a lamp in the place of each virtual camera, projectors what
@@ -154,6 +157,8 @@ class CaptureOptions(Call):
     def check(self) -> None:
         """Refuse what does not go together."""
         lights, single = str(self.lights), self.samples == 1
+        if self.own_light and self.geometry == "prototype":
+            raise InputError("--own-light is that of shells: leave out --prototype")
         if self.lights is not None and not single:
             raise InputError("--lights follows one ray a pixel: leave out --samples")
         if self.every > 1 and lights not in ("mirrors", "projectors"):

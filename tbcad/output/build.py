@@ -11,7 +11,7 @@ from tbcad_verify.run.processes import at_once
 
 from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.common.schedule import Submit
-from tbcad.core.camera.sheet import write_camera_sheet
+from tbcad.core.camera.sheet import RigLight, write_camera_sheet
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.spec.design import Spec
@@ -19,6 +19,8 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
 from tbcad.prototype.files.write import export_prototype
+from tbcad.prototype.purchased.parts import load_parts
+from tbcad.records.design import ShellLamps
 from tbcad.shell.files import (
     design_mandrel,
     mandrel_record,
@@ -27,6 +29,8 @@ from tbcad.shell.files import (
     write_shell_meshes,
     write_shell_solids,
 )
+from tbcad.shell_lamps.files import printed_ring, ring_record, write_ring
+from tbcad.shell_lamps.ring import lamp_ring
 from tbcad.types import Progress
 
 
@@ -64,15 +68,21 @@ def write_export(
     # Refused before anything is written.
     mandrel = design_mandrel(design) if design.spec.shell.negative and SHELL in parts else None
     export = Export(design.spec, tuple(part for part in PARTS if part in parts))
+    lamps = None
     if SHELL in parts:
         envelope = shell_envelope(design)  # refuses flanges that do not fit
+        lamps = _lamps(design, folder, submit_file)
         submit_file(write_shell_meshes, design, envelope, folder)
         if PROTOTYPE in parts:
             submit_file(write_shell_solids, design, envelope, folder)
         else:
             write_shell_solids(design, envelope, folder, progress)
     # The prototype's light and mount are in its own, which replaces it.
-    write_camera_sheet(folder, design.arrays[0], design.spec.optics.capture_diameter_mm / 2)
+    light, radius = (
+        RigLight(lamps.lux[1] if lamps else None),
+        design.spec.optics.capture_diameter_mm,
+    )
+    write_camera_sheet(folder, design.arrays[0], radius / 2, light)
     if PROTOTYPE in parts:
         try:
             export = replace(export, spec=export_prototype(design, folder, progress, submit_file))
@@ -96,7 +106,19 @@ def write_export(
         )
         export = replace(export, note="; ".join(filter(None, (export.note, undercut))))
     mandrels = [mandrel_record(array, mandrel) for array in design.arrays if mandrel]
-    write_record(folder, replace(design, spec=export.spec), SHELL in parts, mandrels)
+    write_record(folder, replace(design, spec=export.spec), SHELL in parts, mandrels, lamps)
     progress("manifest")
     write_manifest(folder, "build")
     return export
+
+
+def _lamps(
+    design: MirrorDesign, folder: Path, submit: Callable[..., Future[Any]]
+) -> ShellLamps | None:
+    """Write the ring of a shell's lamps; what design.json says of them, None without any."""
+    ring = lamp_ring(design, load_parts())
+    if ring is None:
+        return None
+    part = printed_ring(ring, design.spec.printer)
+    submit(write_ring, design.spec, ring, part, folder)
+    return ring_record(ring, part, design)

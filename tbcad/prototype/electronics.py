@@ -139,13 +139,13 @@ def e24_at_least(ohm: float) -> float:
 
 
 def series_resistor(
-    led: PurchasedPart, max_ma: float, supply_v: float, parts: Parts
+    led: PurchasedPart, max_ma: float, supply_v: float, parts: Parts, number: int = 1
 ) -> SeriesResistor:
-    """The resistor with which an LED gets a current (mA), or a little less, from a supply (V).
+    """The resistor with which LEDs in series get a current (mA), or less, from a supply (V).
 
     SpecError when the LED bears less, the supply is too low, or no resistor is large enough.
     """
-    forward = led["forward_v"]
+    forward = number * led["forward_v"]
     if max_ma > led["max_ma"]:
         raise SpecError(
             f"prototype.stage.led_ma {max_ma:g} is more than {led.name} bears: make it "

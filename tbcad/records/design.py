@@ -7,6 +7,7 @@ from pydantic import Field
 from tbcad.cad.formats.checked_files import Finite, Vector
 from tbcad.core.spec.design import Spec
 from tbcad.records.document import Document, RecordSection
+from tbcad.records.prototype import PrintedPartRecord
 
 NAME = "design.json"
 MISSING = "name a folder that tbcad build wrote"
@@ -41,6 +42,39 @@ class MandrelRecord(ShellFiles):
     draft_deg: Finite
 
 
+class LampRecord(RecordSection):
+    """A small Lambertian lamp: middle of its face, direction that it shines in, and its camera."""
+
+    camera: Literal["a", "b"]
+    position_mm: Vector
+    direction: Vector
+
+
+class ShellLamps(RecordSection):
+    """LEDs on the lenses of a shell's cameras, and the ring that carries those of each.
+
+    Attributes:
+        ring: in a frame of its own, whose axes are a camera's `right`, up in its picture, and
+            backward; the middle of the face is the origin.
+        led: as in the list of parts.
+        emitter_mm: width of what shines.
+        candela: of one, along its direction.
+        front_mm: from each pinhole to the ring's face, along the optical axis.
+        watt: of all, resistors included.
+        lux: least, mean and greatest on surfaces of the object that face all ways.
+    """
+
+    ring: PrintedPartRecord
+    led: str
+    emitter_mm: float = Field(gt=0, le=100)
+    candela: float = Field(gt=0, le=1e6)
+    front_mm: Finite
+    bore_mm: float = Field(gt=0, le=1000)
+    watt: float = Field(gt=0, le=1e4)
+    lux: Vector
+    places: tuple[LampRecord, ...]
+
+
 class DesignRecord(Document):
     """design.json.
 
@@ -51,6 +85,7 @@ class DesignRecord(Document):
         foot_z_mm: height of the shells' lowest plane.
         parts: the shells, where they were built.
         mandrels: left out where there are none.
+        lamps: of the shell, left out where it has none.
         mirrors: file of their table.
     """
 
@@ -63,9 +98,10 @@ class DesignRecord(Document):
     cameras: tuple[CameraRecord, CameraRecord]
     parts: tuple[ShellFiles, ...]
     mandrels: tuple[MandrelRecord, ...] = ()
+    lamps: ShellLamps | None = None
     mirrors: Literal["mirrors.csv"]
 
     def document(self) -> dict[str, Any]:
         """The JSON object."""
-        left_out = set() if self.mandrels else {"mandrels"}
+        left_out = {name for name in ("mandrels", "lamps") if not getattr(self, name)}
         return self.model_dump(mode="json", by_alias=True, exclude=left_out)

@@ -61,6 +61,7 @@ def photograph(options: CaptureOptions) -> Photographs:
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
     from tbcad.light.simulate.scene.ray_casting import prepared_scene
     from tbcad.light.simulate.scene.reflector import read_export
+    from tbcad.light.simulate.scene.shell_lamps import lit_by_mirrors, read_shell_lamps
     from tbcad.output.folder import check_replaceable
     from tbcad.output.single_files import files_named
 
@@ -73,6 +74,9 @@ def photograph(options: CaptureOptions) -> Photographs:
     subject = load_object(file, export.capture_mm, taken, options.answer)
     lamps = read_lamps(export.folder) if options.geometry == "prototype" else None
     subject = lit_by(lamps, subject) if lamps else subject
+    if options.own_light:
+        subject = lit_by_mirrors(export, read_shell_lamps(export.folder), subject)
+    lit = "lamps of the prototype" if lamps else "lamps of the shell" if options.own_light else ""
     scene = prepared_scene(subject)
     cameras = camera_photographs(export, scene, options.geometry, options.samples, options.detail)
     facts = {
@@ -81,7 +85,7 @@ def photograph(options: CaptureOptions) -> Photographs:
         "n": export.spec.optics.n,
         "geometry": options.geometry,
         "samples": options.samples,
-    } | ({"light": "lamps of the prototype"} if lamps else {})
+    } | ({"light": lit} if lit else {})
     if subject.reading is not None:
         facts["object_file"] = asdict(subject.reading)
     return Photographs(cameras, scene, export.capture_mm, facts, sources)

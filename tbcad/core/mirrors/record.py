@@ -10,7 +10,13 @@ from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.common.figure_files import shades
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.records.design import NAME as DESIGN_FILE
-from tbcad.records.design import CameraRecord, DesignRecord, MandrelRecord, ShellFiles
+from tbcad.records.design import (
+    CameraRecord,
+    DesignRecord,
+    MandrelRecord,
+    ShellFiles,
+    ShellLamps,
+)
 from tbcad.records.tables import MirrorRow
 from tbcad.types import Floats
 
@@ -44,19 +50,26 @@ def mirror_rows(array: MirrorArray) -> list[Row]:
 
 
 def write_record(
-    folder: Path, design: MirrorDesign, shells: bool, mandrels: Sequence[MandrelRecord] = ()
+    folder: Path,
+    design: MirrorDesign,
+    shells: bool,
+    mandrels: Sequence[MandrelRecord] = (),
+    lamps: ShellLamps | None = None,
 ) -> None:
-    """Write mirrors.csv and design.json, with shells and their negatives where they are there."""
+    """Write mirrors.csv and design.json, with shells, negatives and lamps where they are there."""
     write_table(
         folder / MirrorRow.FILE,
         COLUMNS,
         (row for array in design.arrays for row in mirror_rows(array)),
     )
-    design_record(design, shells, mandrels).write(folder / DESIGN_FILE)
+    design_record(design, shells, mandrels, lamps).write(folder / DESIGN_FILE)
 
 
 def design_record(
-    design: MirrorDesign, shells: bool, mandrels: Sequence[MandrelRecord] = ()
+    design: MirrorDesign,
+    shells: bool,
+    mandrels: Sequence[MandrelRecord] = (),
+    lamps: ShellLamps | None = None,
 ) -> DesignRecord:
     """What design.json holds; the mirrors are in the file that it names."""
     spec, (a, b) = design.spec, design.arrays
@@ -68,6 +81,7 @@ def design_record(
         cameras=(_camera(a), _camera(b)),
         parts=tuple(ShellFiles(**part_files("shell", one)) for one in (a, b) if shells),
         mandrels=tuple(mandrels),
+        lamps=lamps,
         mirrors=MirrorRow.FILE,
     )
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 from pydantic import BeforeValidator, Field, model_validator
 
 from tbcad.core.spec.prototype import CapMaking, PrototypeSpec
-from tbcad.core.spec.section import OrWord, Section, as_tuple, whole
+from tbcad.core.spec.section import AUTO, OR_AUTO, OrWord, Section, as_tuple, whole
 from tbcad.core.spec.sizes import OpticsSpec, with_sizes
 
 _Side: TypeAlias = Annotated[float, Field(ge=20, le=2000)]
@@ -127,6 +127,19 @@ class FootFlangeSpec(FlangeSpec):
     """Number of bolt holes."""
 
 
+class ShellLampsSpec(Section):
+    """A ring of LEDs on each camera's lens: the mirrors throw their light onto the object."""
+
+    leds: Annotated[int, OR_AUTO] = Field(AUTO, ge=0, le=8)
+    """LEDs on each ring; 0: no lamps; auto: 6, or 0 where the rings have no room."""
+    lens_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=20, le=200)
+    """Diameter of the lens's barrel that a ring is clamped on; auto: that of the prototype's camera
+    (prototype.frame.camera), or 60 where none is known."""
+    front_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=-100, le=100)
+    """Distance of the ring's face before the pinhole; auto: that of the lens's front, and so near
+    that the camera does not see the ring."""
+
+
 class ShellSpec(Section):
     """The body behind the mirrors, and the edges between them."""
 
@@ -147,6 +160,8 @@ class ShellSpec(Section):
     """Joins the two halves at x = 0."""
     foot_flange: FootFlangeSpec = FootFlangeSpec()
     """Joins a half to the base plate."""
+    lamps: ShellLampsSpec = ShellLampsSpec()
+    """Lights the object through the mirrors."""
 
 
 class MeshSpec(Section):

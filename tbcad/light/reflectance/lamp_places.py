@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from tbcad.common.compiled import compiled_loop
 from tbcad.core.geometry import vectors
-from tbcad.core.geometry.loop_vectors import divided, dot, minus, plus_scaled, unit, vector
+from tbcad.core.geometry.loop_vectors import vector
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
+from tbcad.core.optics.mirror_light import reflection
 from tbcad.core.spec.csv_rows import number, read_rows
 from tbcad.errors import InputError
 from tbcad.light.datasets.virtual_cameras import (
@@ -39,7 +40,6 @@ PROJECTORS = "projectors"
 LEAST_CURVATURE = 1e-7
 # Both halves of a mirror on the seam have one direction, and one virtual camera.
 SAME_DIRECTION = 1e-9
-STEPS = 20  # of the search for a point of reflection; each gains a digit or so
 
 
 @dataclass(frozen=True)
@@ -153,23 +153,11 @@ def reflected(
 ) -> tuple[Floats, Floats]:
     """Points (k, 3) of a sphere that reflect a pinhole into others, and how far light spreads.
 
-    That is the area that a unit of solid angle of the pinhole falls on, across the ray, mm2, (k,).
-    With the curvatures 1/s + 2/(r cos i) in the plane of incidence and 1/s + 2 cos i/r across it,
-    of light that has gone s from the pinhole, it is s^2 (1 + t c1) (1 + t c2) after t more. The
-    points are found as by `tbcad.core.optics.reflection.reflection_points`.
+    The latter, (k,), mm2, is that of `tbcad.core.optics.mirror_light.reflection`.
     """
     points, spread = np.empty_like(place), np.empty(len(place))
     middle, start = vector(centre), vector(pinhole)
     for k in range(len(place)):
-        normal = unit(minus(start, middle))
-        for _ in range(STEPS):
-            point = plus_scaled(middle, radius, normal)
-            to_pinhole, to_place = minus(start, point), minus(vector(place[k]), point)
-            s, t = np.sqrt(dot(to_pinhole, to_pinhole)), np.sqrt(dot(to_place, to_place))
-            bisector = plus_scaled(divided(to_pinhole, s), 1 / t, to_place)
-            normal = unit(plus_scaled(unit(bisector), radius / 2 * (1 / s + 1 / t), normal))
+        point, spread[k] = reflection(middle, radius, start, vector(place[k]))
         points[k, 0], points[k, 1], points[k, 2] = point
-        cosine = dot(normal, to_pinhole) / s
-        within, aside = 1 / s + 2 / (radius * cosine), 1 / s + 2 * cosine / radius
-        spread[k] = s**2 * (1 + t * within) * (1 + t * aside)
     return points, spread

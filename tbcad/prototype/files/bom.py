@@ -15,7 +15,7 @@ from tbcad.core.spec.errors import SpecError, short_text
 from tbcad.errors import InputError
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive
-from tbcad.prototype.purchased.parts import Parts, Price, Prices
+from tbcad.prototype.purchased.parts import Parts, Price, Prices, PurchasedPart
 
 # A body, a number with its part, and a letter of its form, such as "DIN 705 A" or "ISO 3290-1".
 STANDARD = re.compile(r"\b(?:ISO|DIN|EN|IEC|ASME|ANSI) (?:[A-Z]+)?\d+(?:[.-]\d+)*(?: [A-Z](?= ))?")
@@ -112,6 +112,21 @@ def tool_rows(first: int, prices: Prices) -> list[Row]:
     return rows
 
 
+def list_rows(
+    bought: Iterable[tuple[PurchasedPart, int]],
+    printed: Mapping[PrintedItem, int],
+    density: float,
+    prices: Prices,
+) -> list[Row]:
+    """The rows of a list by itself: what is bought, then what is printed of a density (g/cm^3)."""
+    rows = [
+        _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
+        for part, quantity in bought
+    ]
+    rows += [_printed(item, density, prices, quantity) for item, quantity in printed.items()]
+    return [{"item": item, **row} for item, row in enumerate(rows, 1)]
+
+
 def totals(rows: Iterable[Row]) -> dict[str, Any]:
     """Sums of a list, for prototype.json; prices by currency, of parts that have one."""
     rows = list(rows)
@@ -162,17 +177,17 @@ def _bought(part: str, what: str, quantity: int, material: str, mass: float, pri
     return {**row, **price_columns(quantity, prices.of(part, mass)), "from": BOUGHT}
 
 
-def _printed(item: PrintedItem, density: float, prices: Prices) -> Row:
+def _printed(item: PrintedItem, density: float, prices: Prices, quantity: int = 1) -> Row:
     """Its mass is that of a solid print, and its price that of its filament."""
     filament_mm3, hours = item.estimate
     filament = filament_mm3 / MM3_PER_CM3 * density
     mass = item.volume / MM3_PER_CM3 * density
     return {
-        **_row(item.name, TOOL_MARK * item.tool + item.what, 1, item.material, mass),
+        **_row(item.name, TOOL_MARK * item.tool + item.what, quantity, item.material, mass),
         "print_volume_mm3": round(item.volume),
         "filament_g": _estimate(filament),
         "print_hours": _estimate(hours),
-        **price_columns(1, _with_finish(prices.of(item.material, filament), item, prices)),
+        **price_columns(quantity, _with_finish(prices.of(item.material, filament), item, prices)),
         "from": PRINTED,
     }
 

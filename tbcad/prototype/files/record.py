@@ -69,7 +69,7 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
         alternatives=layout.alternatives,
         seats=_seats(built),
         holding=holding(built.base, layout, built.parts),
-        parts=tuple(map(_part, built.printed)),
+        parts=tuple(map(part_record, built.printed)),
         leds=tuple(
             records.Led(name=name, position_mm=(place + 0.0).tolist(), direction=way.tolist())
             for name, place, way in led_poses(built.stage)
@@ -185,7 +185,7 @@ def _seats(built: PrototypeModel) -> tuple[records.SeatRecord, ...]:
     )
 
 
-def _part(part: PrintedPart) -> records.PrintedPartRecord:
+def part_record(part: PrintedPart, quantity: int = 1) -> records.PrintedPartRecord:
     """A printed part; y = x @ axes + origin is a point on the bed."""
     return records.PrintedPartRecord(
         name=part.name,
@@ -196,7 +196,7 @@ def _part(part: PrintedPart) -> records.PrintedPartRecord:
         role=part.role,
         finish="mirror" if part.role == "cap" else None if part.role == "tool" else MATT_BLACK,
         ball=part.ball + 1 if part.ball >= 0 else None,
-        quantity=1,
+        quantity=quantity,
         axes=(part.solid.axes + 0.0).tolist(),
         origin_mm=(part.solid.origin + 0.0).tolist(),
     )

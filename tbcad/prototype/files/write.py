@@ -79,7 +79,7 @@ def export_prototype(
     built = build_prototype_model(arrangements(design), progress, submit)
     spec = built.spec
     progress("prototype: files")
-    prints = [submit(_write_part, folder, part, spec) for part in built.printed]
+    prints = [submit(write_part, folder, part, spec) for part in built.printed]
     if shroud := built.shroud:
         for panel in shroud.panels:
             submit(write_dxf, folder / f"{panel.name}.dxf", pattern(panel, shroud.sheet))
@@ -112,7 +112,7 @@ def export_prototype(
     return spec
 
 
-def _write_part(folder: Path, part: PrintedPart, spec: Spec) -> tuple[float, float]:
+def write_part(folder: Path, part: PrintedPart, spec: Spec) -> tuple[float, float]:
     """STEP as assembled, STL and 3MF on the printer's bed; an estimate of its print."""
     mesh, solid = part_mesh(part), Solid(part.name, part.solid.shape, ())
     write_step(folder / f"{part.name}.step", solid, spec.step.pcurves, part.solid.properties)

@@ -18,9 +18,9 @@ from tbcad.core.spec.errors import SpecError, short_text
 COMMON_COLUMNS = ("part", "what", "material", "mass_g")
 KINDS = (
     *("motors", "stages", "wheels", "belts", "couplings", "shafts", "bearings", "screws"),
-    *("setscrews", "inserts", "dowels", "magnets", "leds", "strips", "sheets", "resistors"),
-    *("wires", "connectors", "boards", "electronics", "extrusions", "tnuts", "nuts", "washers"),
-    *("collars", "spacers", "brakes", "plates", "brackets", "tubes", "clamps"),
+    *("setscrews", "inserts", "dowels", "magnets", "leds", "strips", "stars", "sheets"),
+    *("resistors", "wires", "connectors", "boards", "electronics", "extrusions", "tnuts", "nuts"),
+    *("washers", "collars", "spacers", "brakes", "plates", "brackets", "tubes", "clamps"),
 )
 """Lists of parts, in the order in which they are listed. Their own columns are sizes above zero.
 

@@ -14,11 +14,19 @@ from tbcad.cad.formats.checked_files import columns
 from tbcad.cad.formats.glb import ColouredMesh, read_glb
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.core.geometry.conics import Ellipsoid
+from tbcad.core.geometry.primitives import (
+    Cylinder,
+    Primitive,
+    enclosing_triangles,
+    revolved_along,
+)
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import MeshSpec, Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.records.design import NAME as DESIGN
+from tbcad.records.design import DesignRecord
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.tables import BallRow, MirrorRow, PictureRow
 from tbcad.report.page.verdict import Verdict
@@ -156,6 +164,8 @@ STEPS = 65_535  # of positions along a body's longest side
 APART, LIFTED, FASTENER_MM, SHELLS_APART = 0.7, 1.5, 30.0, 0.6
 STATIC = ("stage", "frame", "bought", "shroud")
 SHELL_COLOUR = (0.80, 0.80, 0.80, 1.0)
+RING, SHINING = (0.25, 0.26, 0.28, 1.0), (1.0, 0.85, 0.30, 1.0)
+RING_MM = 12.0  # how far a ring of LEDs reaches beyond them, and its height
 
 
 class Body(NamedTuple):
@@ -264,6 +274,29 @@ def prototype_bodies(folder: Path) -> Iterator[Body]:
         mesh, turns = one.mesh, one.name in turning
         points, faces = mesh.vertices, mesh.triangles
         yield Body(one.name, one.group, points, faces, one.colour, apart[one.name], turns)
+
+
+def lamp_bodies(folder: Path) -> Iterator[Body]:
+    """The lamps on the lenses of a shell's cameras, roughly: their rings, and each LED."""
+    record = DesignRecord.read(folder / DESIGN)
+    if (lamps := record.lamps) is None:
+        return
+    for camera in record.cameras:
+        mine = [one for one in lamps.places if one.camera == camera.id]
+        places, forward = np.array([one.position_mm for one in mine]), np.array(camera.forward)
+        middle = np.array(camera.pinhole_mm) + lamps.front_mm * forward
+        inner, outer = lamps.bore_mm / 2, norm(places[0] - middle) + RING_MM
+        profile = np.array([[0, inner], [0, outer], [-RING_MM, outer], [-RING_MM, inner]])
+        yield _primitive(f"lamp_ring_{camera.id}", revolved_along(profile, middle, forward), RING)
+        for k, place in enumerate(places, 1):
+            led = Cylinder(place, forward, lamps.emitter_mm / 2, lamps.emitter_mm / 2)
+            yield _primitive(f"led_{camera.id}{k}", led, SHINING)
+
+
+def _primitive(name: str, body: Primitive, colour: tuple[float, ...]) -> Body:
+    corners = enclosing_triangles(body).reshape(-1, 3)
+    triangles = np.arange(len(corners)).reshape(-1, 3)
+    return Body(name, "lamps", corners, triangles, colour, np.zeros(3))
 
 
 def _coarse(spec: Spec) -> Spec:

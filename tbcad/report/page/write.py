@@ -46,6 +46,7 @@ SCRIPTS = ("data.js", "mesh.js", "viewer.js", "rays.js", "map.js", "page.js")
 GROUPS = {
     "shell_a": "Shell of camera a",
     "shell_b": "Shell of camera b",
+    "lamps": "Lamps of the shell",
     "base": "Base (turns)",
     "balls": "Balls",
     "stage": "Object stage",
@@ -165,6 +166,7 @@ def _data(
     facets = bodies.coarse_facets(export)
     shells = "shell_a.stl" in manifest.files
     drawn = bodies.packed_shells(export, facets, arrays) if shells else []
+    drawn += [bodies.packed_body(one, arrays) for one in bodies.lamp_bodies(folder)]
     if PROTOTYPE[0] in manifest.files:
         drawn += [bodies.packed_body(one, arrays) for one in bodies.prototype_bodies(folder)]
     pinhole = export.reflectors[0].camera.pinhole

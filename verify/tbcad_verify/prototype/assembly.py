@@ -5,7 +5,7 @@ Purchased parts have no file of their own. Their shapes are taken from the assem
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -235,19 +235,29 @@ def closed_solid(name: str, drawn: Mapping[str, Shape]) -> Any:
 def part_step_checks(
     export: Export, masses: dict[str, MassProperties], files: dict[str, StepFile | Unknown]
 ) -> list[Check]:
+    """All checks of the STEP files of a prototype's parts, and of its coupons."""
+    checked = printed_step_checks(export, export.printed, masses, files)
+    return checked + guarded([COUPONS], lambda: [_coupon_check(export, files)])
+
+
+def printed_step_checks(
+    export: Export,
+    parts: Sequence[PrintedPart],
+    masses: dict[str, MassProperties],
+    files: dict[str, StepFile | Unknown],
+) -> list[Check]:
     """All checks of the STEP files of printed parts, against figures of the placed meshes."""
 
     def compared(part: PrintedPart) -> PartComparison:
         file, mass = known(files[part.name]), masses.get(part.name)
         return PartComparison(part.name, file, mass, export.mesh_error_mm, CLAIM_SHARE)
 
-    checked = [
+    return [
         check
-        for part in export.printed
+        for part in parts
         if part.step
         for check in file_checks(PART_CHECKS, part.step, partial(compared, part))
     ]
-    return checked + guarded([COUPONS], lambda: [_coupon_check(export, files)])
 
 
 def _coupon_check(export: Export, files: dict[str, StepFile | Unknown]) -> Check:

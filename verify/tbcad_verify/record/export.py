@@ -46,6 +46,7 @@ OTHER_RECORDS = {
 MOST = 1000  # cameras or parts
 MOST_FILES = 10_000
 MAX_SIDE_PX = 65536
+MAX_NAME = 64
 MAX_PIXELS = 500_000_000
 SQUARE = 1e-6  # by which axes of a camera may be off unit length or a right angle
 
@@ -109,6 +110,30 @@ class Mandrel(Part):
         return pull
 
 
+class ShellLamp(Strict):
+    """An LED: the camera that it is at, its middle (3,), mm, and its unit direction (3,)."""
+
+    camera: Name
+    position: Vector = Field(alias="position_mm")
+    direction: Vector
+
+    @field_validator("direction", mode="after")
+    @classmethod
+    def _unit(cls, direction: Floats) -> Floats:
+        if abs(float(direction @ direction) - 1) > SQUARE:
+            raise ValueError("is no unit vector")
+        return direction
+
+
+class ShellLamps(Strict):
+    """LEDs on the lenses of a shell's cameras, and the ring that carries those of each."""
+
+    ring: PrintedPart
+    led: str = Field(max_length=MAX_NAME)
+    front_mm: float = Field(ge=-1e3, le=1e3)
+    places: list[ShellLamp] = Field(min_length=1, max_length=MOST)
+
+
 class Design(Strict):
     """design.json: see `Export`."""
 
@@ -119,6 +144,7 @@ class Design(Strict):
     cameras: list[Camera] = Field(min_length=1, max_length=MOST)
     parts: list[Part] = Field(max_length=MOST)
     mandrels: list[Mandrel] = Field(default=[], max_length=MOST)
+    lamps: ShellLamps | None = None
     mirrors: Literal["mirrors.csv"]
 
     @model_validator(mode="after")
@@ -174,6 +200,12 @@ class Export:
     # the machine with balls; None where only the shell was built
     prototype: Prototype | None = None
     mandrels: tuple[Mandrel, ...] = ()  # negatives of the shells, in the record's order
+    lamps: ShellLamps | None = None  # on the lenses of the shell's cameras
+
+    @property
+    def rings(self) -> tuple[PrintedPart, ...]:
+        """What carries the shell's lamps."""
+        return (self.lamps.ring,) if self.lamps else ()
 
     @property
     def printed(self) -> tuple[PrintedPart, ...]:
@@ -183,7 +215,7 @@ class Export:
     @property
     def files(self) -> frozenset[str]:
         """All files that are read: records, parts, their assembly, drawings and programs."""
-        parts = (*self.parts, *self.mandrels, *self.printed)
+        parts = (*self.parts, *self.mandrels, *self.printed, *self.rings)
         names = {name for part in parts for name in (part.stl, part.step, part.threemf)}
         names |= {DESIGN, MIRRORS}
         if self.prototype:
@@ -261,11 +293,13 @@ def read_export(folder: Path) -> Export:
         digests=digests,
         prototype=prototype,
         mandrels=tuple(design.mandrels),
+        lamps=design.lamps,
     )
 
 
 def _check_parts(design: Design, prototype: Prototype | None) -> None:
     others = [*design.mandrels, *(prototype.parts if prototype else [])]
+    others += [design.lamps.ring] if design.lamps else []
     meshes = [part.stl for part in (*design.parts, *others)]
     if not meshes or len(set(meshes)) != len(meshes):
         raise BadExport(f"{DESIGN}: parts must be there, each with an STL of its own; {AGAIN}")

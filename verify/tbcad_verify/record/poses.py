@@ -15,7 +15,7 @@ from tbcad_verify.mesh.surfaces import reflect_directions
 from tbcad_verify.mesh.vectors import axis_frame, dot, norm, polar_and_azimuth, unit, wrapped
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.mirrors import Mirrors
-from tbcad_verify.record.spec import LARGEST_MESH_ERROR_MM, OpticsSpec
+from tbcad_verify.record.spec import AUTO, LARGEST_MESH_ERROR_MM, OpticsSpec
 from tbcad_verify.types import Floats
 
 POSE_MM = 1e-9
@@ -143,6 +143,9 @@ def contradictions(export: Export) -> list[str]:
     shells = export.parts if export.spec.shell.negative else ()
     if sorted(one.camera for one in export.mandrels) != sorted(one.camera for one in shells):
         wrong.append("the mandrels of shell.negative")
+    asked = export.spec.shell.lamps.leds
+    if export.parts and asked != AUTO and bool(asked) != bool(export.lamps):
+        wrong.append("the lamps of shell.lamps.leds")
     return sorted(wrong)
 
 

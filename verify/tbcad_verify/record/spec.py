@@ -5,7 +5,7 @@ A key outside its range is refused: a build never writes one. All others are ign
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapValidator
 
@@ -13,7 +13,7 @@ from tbcad_verify.record.validation import Strict
 
 LARGEST_MESH_ERROR_MM = 0.5  # that a spec may ask for and still pass
 
-AUTO = "auto"  # of a key that only a prototype needs, where none was built
+AUTO: Any = "auto"  # of a key that only a prototype needs, where none was built
 
 
 def _or_auto(value: object, check: ValidatorFunctionWrapHandler) -> object:
@@ -77,6 +77,14 @@ class FlangeSpec(Strict):
     dowels: int = Field(ge=0, le=10)
 
 
+class ShellLampsSpec(Strict):
+    """Rings of LEDs on the lenses of a shell's cameras."""
+
+    leds: Annotated[int, Field(ge=0, le=8), OR_AUTO] = 0
+    lens_mm: Annotated[float, Field(ge=20, le=200), OR_AUTO] = 60.0
+    front_mm: Annotated[float, Field(ge=-100, le=100), OR_AUTO] = 0.0
+
+
 class ShellSpec(Strict):
     """The body behind the mirrors."""
 
@@ -86,6 +94,8 @@ class ShellSpec(Strict):
     negative: bool = False
     seam_flange: FlangeSpec
     foot_flange: FlangeSpec
+    # Exports from before this section have no lamps.
+    lamps: ShellLampsSpec = ShellLampsSpec()
 
 
 class MeshSpec(Strict):

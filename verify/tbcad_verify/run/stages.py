@@ -24,7 +24,7 @@ from tbcad_verify.printing.assessment import (
 )
 from tbcad_verify.printing.part_measures import PartMeasures, measure
 from tbcad_verify.printing.profile import Profile, built_in, load
-from tbcad_verify.prototype.measured_parts import MeasuredPart
+from tbcad_verify.prototype.measured_parts import MeasuredPart, measure_part
 from tbcad_verify.prototype.stages import PRINTING, verify_prototype
 from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
 from tbcad_verify.record.export import Export, read_export
@@ -33,6 +33,7 @@ from tbcad_verify.report.checks import Check, attempt, check_names, guarded, req
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import MirrorChecks, Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
+from tbcad_verify.shell import lamps as shell_lamps
 from tbcad_verify.shell.cutter import fillet_checks
 from tbcad_verify.shell.integrity import MANIFEST, manifest_checks, mesh_ends_checks, record_checks
 from tbcad_verify.shell.mandrel import mandrel_results
@@ -50,14 +51,15 @@ SHELL_STAGES = (
     "coverage",
     "every pixel",
 )
-MANDRELS = "mandrels"
+MANDRELS, LAMPS = "mandrels", "lamps"
 READING, THREEMF, RECORD, MESHES, PRINTABILITY, SETUP, COVERAGE, PIXELS = SHELL_STAGES
 
 
 def stage_titles(export: Export) -> tuple[str, ...]:
     """Titles of the stages that an export has, in order."""
     mandrels = (MANDRELS,) if export.mandrels else ()
-    return (*SHELL_STAGES, *mandrels, *(PROTOTYPE_STAGES if export.prototype else ()))
+    lamps = (LAMPS,) if export.lamps else ()
+    return (*SHELL_STAGES, *mandrels, *lamps, *(PROTOTYPE_STAGES if export.prototype else ()))
 
 
 def run_stages(
@@ -77,7 +79,7 @@ def run_stages(
     profiles = [load(name) for name in printers or built_in()]
     sink(Results(stages=[READING]))
     export = read_export(folder)
-    parts = (*export.parts, *export.mandrels, *export.printed)
+    parts = (*export.parts, *export.mandrels, *export.rings, *export.printed)
     blobs = [read_facets(export.folder, part.stl) for part in parts]
     digests = {blob.name: blob.digest for _, blob in blobs}
     facets = [facets for facets, _ in blobs]
@@ -92,8 +94,8 @@ def run_stages(
     manifest = guarded(MANIFEST, lambda: manifest_checks(export, {**export.digests, **digests}))
     sink(Results(checks=manifest + record_checks(export)))
 
-    shells, mandrels = len(export.parts), len(export.mandrels)
-    printed, facets = facets[shells + mandrels :], facets[: shells + mandrels]
+    own = len(export.parts) + len(export.mandrels) + len(export.rings)
+    printed, facets = facets[own:], facets[:own]
     prototype: SimpleQueue[Results | None] = SimpleQueue()
     work = _verify_prototype, export, printed, profiles, bool(printers)
     if beside and export.prototype:
@@ -125,7 +127,8 @@ def _verify_shells(
     sink: ResultSink,
 ) -> None:
     sink(Results(stages=[MESHES]))
-    negatives = facets[len(export.parts) :]
+    last = len(facets) - len(export.rings)
+    negatives, rings = facets[len(export.parts) : last], facets[last:]
     shells = _measure_shells(export, facets[: len(export.parts)], sink)
     facets.clear()  # half of the memory
 
@@ -148,6 +151,7 @@ def _verify_shells(
             fillets = guarded(names, lambda: fillet_checks(known(), cutter_mm))
             sink(Results(checks=fillets))
         _verify_mandrels(export, negatives, known, cutter_mm, sink)
+        _verify_lamps(export, rings, known, profiles, required, sink)
 
 
 def _verify_mandrels(
@@ -163,6 +167,28 @@ def _verify_mandrels(
     sink(Results(stages=[MANDRELS]))
     for mandrel, stl in zip(export.mandrels, facets, strict=True):
         sink(mandrel_results(export, mandrel, stl, setup, cutter_mm))
+
+
+def _verify_lamps(
+    export: Export,
+    facets: list[Facets],
+    setup: Callable[[], OpticalSetup],
+    profiles: list[Profile],
+    required: bool,
+    sink: ResultSink,
+) -> None:
+    """The ring of LEDs as a part, and its light by the mirrors that were found."""
+    if not export.lamps:
+        return
+    sink(Results(stages=[LAMPS]))
+    lamps, ring = export.lamps, measure_part(export.lamps.ring, facets[0])
+    masses = {ring.part.name: ring.placed_mass} if ring.placed_mass else {}
+    sink(Results(checks=ring.checks, masses=masses))
+    measures, lost = attempt(partial(_measures, ring))
+    _assess_printing(ring.part.stl, measures, lost, profiles, required, sink)
+    names = check_names(shell_lamps.CHECKS, ring.part.stl)
+    work = guarded(names, lambda: shell_lamps.checks(lamps, ring.placed_mesh, setup()))
+    sink(Results(checks=work))
 
 
 def _shell_measures(

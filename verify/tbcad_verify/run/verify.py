@@ -16,7 +16,7 @@ import numpy as np
 from tbcad_verify.errors import BadExport
 from tbcad_verify.printing.profile import load
 from tbcad_verify.programs import ExpectedPart, check_with_programs
-from tbcad_verify.prototype.assembly import part_step_checks
+from tbcad_verify.prototype.assembly import part_step_checks, printed_step_checks
 from tbcad_verify.record.export import TEXTS, Export, listed_names, read_export
 from tbcad_verify.record.files import open_folder, stamps
 from tbcad_verify.record.validation import PartFiles
@@ -167,6 +167,10 @@ def _compare_steps(export: Export, results: CollectedResults, steps: Callable[[]
         results.add(Results(stages=["STEP of the mandrels"]))
         solids = front_step_checks(export, export.mandrels, masses, steps()[1])
         results.add(Results(checks=solids))
+    if any(part.step for part in export.rings):
+        results.add(Results(stages=["STEP of the lamps' ring"]))
+        solids = printed_step_checks(export, export.rings, masses, steps()[0])
+        results.add(Results(checks=solids))
     if any(part.step for part in export.printed):
         results.add(Results(stages=["STEP of the prototype"]))
         results.add(Results(checks=part_step_checks(export, masses, steps()[0])))
@@ -189,7 +193,8 @@ def _ask_programs(export: Export, results: CollectedResults, seconds: float) -> 
         _expected(export, part, int((cameras == part.camera).sum()), results)
         for part in (*export.parts, *export.mandrels)
     ]
-    parts += [_expected(export, part, None, results) for part in export.printed]
+    others = (*export.printed, *export.rings)
+    parts += [_expected(export, part, None, results) for part in others]
     return check_with_programs(export.folder, parts, seconds, results.progress)
 
 

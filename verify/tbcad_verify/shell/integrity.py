@@ -44,7 +44,10 @@ KINDS = {"stl": ".stl", "step": ".step", "threemf": ".3mf"}  # files that every 
 # Written after the manifest; report.html shows what a verification found, and is no part.
 OWN_FILES = frozenset({"manifest.json", NAME, "report.html"})
 # What a person reads, and no machine: its owner may edit it. Drawings keep their paper's size.
-PAPER_FILES = ("bom.csv", "wiring.csv", "camera.json", "assembly.pdf", "*.pdf")
+PAPER_FILES = (
+    *("bom.csv", "wiring.csv", "camera.json", "lamp_list.csv", "lamp_wiring.csv"),
+    *("assembly.pdf", "*.pdf"),
+)
 MANIFEST = (("manifest", "manifest.json", "wrong files"), PAPER, ("other files", "", "files"))
 TOPOLOGY = {
     "watertight": "bad edges",
@@ -180,7 +183,7 @@ def _part_files(name: CheckName, export: Export) -> Check:
     """Every part has a mesh, a solid and a 3MF, all called as it is."""
     wrong = [
         f"{part.name} has {getattr(part, kind) or 'none'} for {part.name}{suffix}"
-        for part in (*export.parts, *export.mandrels, *export.printed)
+        for part in (*export.parts, *export.mandrels, *export.printed, *export.rings)
         for kind, suffix in KINDS.items()
         if getattr(part, kind) != part.name + suffix
     ]

@@ -97,7 +97,8 @@ def read_step_files(export: Export, processes: Processes) -> dict[str, StepFile 
 
     BadExport: a file is missing, foreign or truncated.
     """
-    parts = [part for part in (*export.parts, *export.mandrels, *export.printed) if part.step]
+    every = (*export.parts, *export.mandrels, *export.printed, *export.rings)
+    parts = [part for part in every if part.step]
     files = examine_all([load(export.folder, part.step) for part in parts], processes)
     return {part.name: file for part, file in zip(parts, files, strict=True)}
 

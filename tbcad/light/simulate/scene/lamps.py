@@ -139,14 +139,17 @@ def irradiance(lamps: RectangularLamps, points: Floats, normals: Floats) -> Floa
 
 
 def lit_by(lamps: RectangularLamps, subject: SceneObject) -> SceneObject:
-    """An object with the light of lamps at its corners, as bright as a good exposure shows it.
+    """An object with the light of lamps at its corners, as bright as a good exposure shows it."""
+    both = [irradiance(lamps, subject.points, side * subject.normals) for side in (1, -1)]
+    return replace(subject, light=exposed(np.column_stack(both)))
+
+
+def exposed(both: Floats) -> Floats:
+    """Light (v, 2) on surfaces and on their backs, lux, as shares of what is shown as white.
 
     The exposure is that of the outside, or of an open surface whose normals are away from the lamps
     that of its back.
     """
-    both = np.column_stack(
-        [irradiance(lamps, subject.points, side * subject.normals) for side in (1, -1)]
-    )
     front, back = np.percentile(both, EXPOSED, axis=0)
     white = float(front or back)
-    return replace(subject, light=np.minimum(both / white, 1.0) if white > 0 else both)
+    return np.minimum(both / white, 1.0) if white > 0 else both

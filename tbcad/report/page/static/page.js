@@ -80,7 +80,7 @@ class Page {
   get hasPrototype() { return "base" in this.data.groups; }
 
   startPresets() {
-    const all = Object.keys(this.data.groups), shells = ["shell_a", "shell_b"];
+    const all = Object.keys(this.data.groups), shells = ["shell_a", "shell_b", "lamps"];
     const hidden = ["shroud", "views"], rig = all.filter((one) => ![...shells, ...hidden].includes(one));
     const presets = [];
     if (this.hasShell) presets.push(["Shells", shells, [-1.25, -0.55]], ["One shell", ["shell_b"], [-0.25, -0.12]]);

@@ -1,0 +1,1 @@
+"""A ring of LEDs on each camera's lens, whose light the shell's mirrors throw onto the object."""

@@ -1,0 +1,48 @@
+"""Objects in the light of a shell's own lamps: fitted as it is computed surface by surface."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tbcad.core.geometry.vectors import unit
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.record import write_record
+from tbcad.core.optics.mirror_light import REFLECTED, light_by_mirrors, lit_mirrors
+from tbcad.errors import InputError
+from tbcad.light.simulate.scene import shell_lamps
+from tbcad.light.simulate.scene.reflector import read_export
+from tbcad.light.simulate.scene.shell_lamps import mirror_light_factors, read_shell_lamps
+from tbcad.prototype.purchased.parts import load_parts
+from tbcad.shell_lamps.files import printed_ring, ring_record
+from tbcad.shell_lamps.ring import lamp_ring
+
+
+@pytest.fixture(scope="module")
+def folder(small_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("lit")
+    ring = lamp_ring(small_design, load_parts())
+    assert ring is not None
+    part = printed_ring(ring, small_design.spec.printer)
+    write_record(folder, small_design, True, (), ring_record(ring, part, small_design))
+    return folder
+
+
+def test_fitted_light_is_that_of_each_surface(folder: Path) -> None:
+    export, lamps = read_export(folder), read_shell_lamps(folder)
+    factors = mirror_light_factors(export, lamps)
+    draw = np.random.default_rng(1)
+    places, normals = 18 * unit(draw.normal(size=(60, 3))), unit(draw.normal(size=(60, 3)))
+    total = np.zeros(60)
+    for one in export.reflectors:
+        mirrors = lit_mirrors(one.mirrors, one.side, one.foot)
+        total += REFLECTED * light_by_mirrors(lamps, mirrors, places, normals)
+    fitted = shell_lamps._terms(export, places, normals) @ factors
+    assert np.abs(fitted - total).max() < 0.1 * total.max()
+    assert np.sqrt(np.mean((fitted - total) ** 2)) < 0.04 * total.max()
+
+
+def test_a_build_without_lamps_is_refused(small_design: MirrorDesign, tmp_path: Path) -> None:
+    write_record(tmp_path, small_design, True)
+    with pytest.raises(InputError, match="leave out --own-light"):
+        read_shell_lamps(tmp_path)
