@@ -68,8 +68,8 @@ class Deviations:
 
 
 def deviations(machine: Machine, plan: Plan) -> Deviations:
-    """Compare a calibrated machine with its plan, which has as many balls."""
-    designed, found = plan.centre, machine.centre
+    """Compare a calibrated machine with its plan, which has as many balls, both without weight."""
+    designed, found = plan.centre - plan.sag, machine.centre
     turn, shift = Rotation.identity(), np.zeros(3)
     if len(designed) >= LEAST_BALLS:
         middles = designed.mean(axis=0), found.mean(axis=0)

@@ -69,7 +69,8 @@ def model(small_design: MirrorDesign, plan: Plan) -> PrototypeWindows:
 def gravity_at(plan: Plan) -> Gravity:
     down = np.stack([np.cos(plan.angle), np.sin(plan.angle)])
     bends = np.random.default_rng(1).normal(0, 0.2, (2, 2, len(plan), 3))
-    return Gravity(4e-3 * np.sin(plan.angle), np.einsum("wt,pwkx->ptkx", down, bends))
+    sag = np.einsum("wt,pwkx->ptkx", down, bends)
+    return Gravity(4e-3 * np.sin(plan.angle), sag, sag.sum(axis=0).mean(axis=0))
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +79,7 @@ def runs(small_design: MirrorDesign, plan: Plan) -> Runs:
 
 
 def draws_of(model: PrototypeWindows, count: int, **errors: Error) -> PrototypeDraws:
-    return draw_prototypes(Errors(**errors), 7, range(count), model.is_cap, model.gravity.wind_up)
+    return draw_prototypes(Errors(**errors), 7, range(count), model.is_cap, model.gravity)
 
 
 @pytest.fixture(scope="module")

@@ -213,7 +213,8 @@ def seat_errors(context: PrototypeContext, machine: AsBuilt) -> SeatErrors:
 
     A ball that lies on three planes moves by d where each plane is raised by n.d along its normal.
     """
-    designed, found = context.prototype.balls.columns("cx", 3), machine.centre
+    balls = context.prototype.balls
+    designed, found = balls.columns("cx", 3) - balls.sag, machine.centre
     turn, shift = _motion(designed, found)
     placed = turn.apply(designed.T).T + shift[:, None]
     off = turn.inv().apply((found - placed).T).T
