@@ -67,8 +67,7 @@ class WeighedBase:
 def against_weight(model: PrototypeModel) -> PrototypeModel:
     """An arrangement whose seats weight brings to where the balls are to be, with its sag.
 
-    On the mean over the pictures of each ball, of which a moved window shows as many pixels as the
-    plan says. As it is with a drive that has no shaft of its own: no list says how stiff the
+    On the mean over the pictures of each ball. As it is with a drive that has no shaft of its own: no list says how stiff the
     bearings of a rotary stage are.
 
     SpecError: there is no room where the seats then are.
@@ -77,7 +76,7 @@ def against_weight(model: PrototypeModel) -> PrototypeModel:
         return model
     sag, layout = sag_of(weighed_base(model)), model.layout
     seen = np.zeros(sag.whole.shape[:2])
-    np.add.at(seen, (layout.stops.stop, layout.fit.ball), layout.fit.pixels)
+    np.add.at(seen, (layout.stops.stop, layout.fit.ball), 1.0)
     mean = np.einsum("sk,skx->kx", seen / seen.sum(axis=0), sag.whole)
     placed = rearranged(model, replace(layout, sag=mean @ sag.axes))
     return replace(placed, sag=sag)
