@@ -65,10 +65,10 @@ class WeighedBase:
 
 
 def against_weight(model: PrototypeModel) -> PrototypeModel:
-    """An arrangement whose seats weight brings to where the balls are to be, with its sag.
+    """An arrangement with its sag, and with seats that weight brings to where the balls are to be.
 
-    On the mean over the pictures of each ball. As it is with a drive that has no shaft of its own: no list says how stiff the
-    bearings of a rotary stage are.
+    On the mean over the pictures of each ball. With a drive that has no shaft of its own nothing
+    sags: no list says how stiff the bearings of a rotary stage are.
 
     SpecError: there is no room where the seats then are.
     """
