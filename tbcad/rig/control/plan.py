@@ -18,7 +18,7 @@ from tbcad.records.prototype import NAME as RECORD
 from tbcad.records.prototype import Prototype
 from tbcad.records.prototype_drive import Phase
 from tbcad.records.run import Frame
-from tbcad.records.tables import BallRow, MirrorRow, PictureRow, StopRow
+from tbcad.records.tables import BallRow, MirrorRow, PictureRow, SagRow, StopRow
 from tbcad.rig.runs import export_digests
 
 PROGRAM = "rotation_plan.nc"
@@ -152,7 +152,7 @@ def read_control_plan(folder: Path) -> ControlPlan:
     program = read_program(folder)
     angles = _angles(folder, program)
     return ControlPlan(
-        sha256=export_digests(folder, FILES),
+        sha256=export_digests(folder, FILES, [SagRow.FILE]),
         size_px=(design.cameras[0].width_px, design.cameras[0].height_px),
         firmware=controller.firmware,
         axis=controller.axis,
