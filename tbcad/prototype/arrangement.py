@@ -40,6 +40,7 @@ from tbcad.prototype.fasteners import Fastener, numbered
 from tbcad.prototype.frame.camera_mount import CameraMount, check_camera
 from tbcad.prototype.frame.chosen_camera import with_camera
 from tbcad.prototype.frame.stock import Stock
+from tbcad.prototype.gravity.sag import Sag
 from tbcad.prototype.keepout import KeepOut, keep_out_volume, min_distance
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout, shroud_layout
@@ -64,6 +65,7 @@ class PrototypeModel(Site):
     balance: BaseBalance
     frame: FrameLayout  # layout of what holds stage, base and camera
     shroud: ShroudLayout | None  # round the rig, None without
+    sag: Sag | None = None  # of the balls by weight, when it is known
     printed: "tuple[PrintedPart, ...]" = ()  # all printed parts, when they are built
 
     @cached_property
@@ -118,6 +120,14 @@ def arrangements(design: MirrorDesign) -> Iterator[PrototypeModel]:
 def arrange(design: MirrorDesign) -> PrototypeModel:
     """The preferred arrangement; raises as `arrangements`."""
     return next(arrangements(design))
+
+
+def rearranged(model: PrototypeModel, layout: PrototypeLayout) -> PrototypeModel:
+    """The same arrangement round a layout that is nearly its own; SpecError: it has no room."""
+    _, outcome = next(_frame_attempts(model.spec, layout, model.parts))
+    if isinstance(outcome, SpecError):
+        raise outcome
+    return outcome
 
 
 def balance_and_drive(

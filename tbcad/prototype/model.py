@@ -29,6 +29,7 @@ from tbcad.prototype.base.seat_solids import cap_parts
 from tbcad.prototype.base.solid import carrier_parts
 from tbcad.prototype.drive.balance import PointMasses
 from tbcad.prototype.electronics import Wiring
+from tbcad.prototype.gravity.weighed import against_weight
 from tbcad.prototype.homing import HomingLayout
 from tbcad.prototype.printed import PlacedSolid, PrintedPart, Role, placed_component
 from tbcad.types import Progress
@@ -48,7 +49,7 @@ def build_prototype_model(
     progress: Progress = lambda _: None,
     submit: Submit = at_once,
 ) -> PrototypeModel:
-    """Build the solids of a prototype by its arrangements, the preferred first.
+    """Build the solids of a prototype by its arrangements, the preferred first, against weight.
 
     Where the kernel fails with the preferred one, other pads and numbers of balls are tried:
     another hub's boss would leave the same faces grazing each other.
@@ -56,14 +57,14 @@ def build_prototype_model(
     SpecError when something does not fit; it says what to change; InvalidSolidError when the kernel
     fails.
     """
-    progress("prototype: balls, their places, stops")
+    progress("prototype: balls, their places, stops, weight")
     errors: dict[tuple[int, float], Exception] = {}
     for arrangement in arranged:
         balls, tilt = len(arrangement.layout), arrangement.base.seats.tilt
         if (balls, tilt) in errors or [k for k, _ in errors].count(balls) == MAX_PADS:
             continue
         try:
-            return _model(arrangement, progress, submit)
+            return _model(against_weight(arrangement), progress, submit)
         except (SpecError, InvalidSolidError) as error:
             errors[balls, tilt] = error
         except KERNEL_ERRORS as error:

@@ -7,13 +7,19 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
+from manifold3d import Manifold
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
 from tbcad.cad.kernel.checks import SolidProperties, check_volume, closed_mesh, properties, volume
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.cad.kernel.meshing import primitive_mesh, volume_by_meshes, without_degenerate
+from tbcad.cad.kernel.meshing import (
+    mesh_difference,
+    mesh_of,
+    primitive_mesh,
+    without_degenerate,
+)
 from tbcad.cad.kernel.solids import (
     cut,
     cylinder,
@@ -212,10 +218,18 @@ def component_solid(component: Component) -> TopoDS_Solid:
     added = [primitive_solid(body) for body in component.added]
     removed = [primitive_solid(body) for body in component.removed]
     solid = one_solid(component.name, cut(fused(added), removed))
-    bodies = (component.added, component.removed)
-    expected = volume_by_meshes(*([primitive_mesh(one) for one in some] for some in bodies))
-    check_volume(component.name, volume(solid), expected, VOLUME_ERROR)
+    check_volume(component.name, volume(solid), _net(component).volume(), VOLUME_ERROR)
     return solid
+
+
+def component_mesh(component: Component) -> Mesh:
+    """A component by booleans of meshes, in the frame of the shell."""
+    return mesh_of(_net(component))
+
+
+def _net(component: Component) -> Manifold:
+    bodies = (component.added, component.removed)
+    return mesh_difference(*([primitive_mesh(one) for one in some] for some in bodies))
 
 
 def placed_component(component: Component, printer: PrinterSpec, mesh_mm: float) -> PlacedSolid:

@@ -74,6 +74,9 @@ class MirrorRow(TableRow):
     coverage_mm: Finite
 
 
+SAG = "sag_x_mm sag_y_mm sag_z_mm"
+
+
 class BallRow(TableRow):
     """A ball or cap with the base at angle zero; a cap has neither grade nor mass.
 
@@ -81,7 +84,10 @@ class BallRow(TableRow):
         px: apex of the reflecting sphere.
         nx: inward normal there.
         cx: its centre.
-        bx: centre of the sphere in the seat.
+        bx: centre of the sphere in the seat as the base is made, which is without weight: by sag
+            above where the ball is to be.
+        sag_x_mm: displacement of the ball by weight, on the mean over its pictures; apex and
+            centre are with it.
         mirrors: that it stands in for.
         coverage_mm: least of them within cells that move with the ball.
         coverage_fixed_mm: within fixed ones.
@@ -112,6 +118,9 @@ class BallRow(TableRow):
     bx: Finite
     by: Finite
     bz: Finite
+    sag_x_mm: Finite = 0.0
+    sag_y_mm: Finite = 0.0
+    sag_z_mm: Finite = 0.0
     mirrors: int
     pixels: Finite
     pixels_shell: Finite

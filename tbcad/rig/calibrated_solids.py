@@ -68,11 +68,11 @@ class Deviations:
 
 
 def deviations(machine: Machine, plan: Plan) -> Deviations:
-    """Compare a calibrated machine with its plan, which has as many balls.
+    """Compare a calibrated machine with its plan, which has as many balls, both without weight.
 
     Caps are compared by their apices, about which their radii differ.
     """
-    designed, found = plan.centre, machine.centre + _growth(machine, plan)
+    designed, found = plan.centre - plan.sag, machine.centre + _growth(machine, plan)
     turn, shift = Rotation.identity(), np.zeros(3)
     if len(designed) >= LEAST_BALLS:
         middles = designed.mean(axis=0), found.mean(axis=0)

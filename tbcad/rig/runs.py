@@ -175,10 +175,15 @@ def exposure_of(
     )
 
 
-def export_digests(exports: Path, names: Iterable[str]) -> dict[str, str]:
-    """sha256 of files of an export by name; InputError: one is not there, or cannot be read."""
+def export_digests(
+    exports: Path, names: Iterable[str], if_there: Iterable[str] = ()
+) -> dict[str, str]:
+    """sha256 of files of an export by name, of some only where they are there.
+
+    InputError: one is not there, or cannot be read.
+    """
     digests = {}
-    for name in names:
+    for name in (*names, *(one for one in if_there if (exports / one).exists())):
         try:
             digests[name] = hashlib.sha256((exports / name).read_bytes()).hexdigest()
         except FileNotFoundError:

@@ -74,10 +74,16 @@ def _section(outline: Floats) -> CrossSection:
     return CrossSection([outline], FillRule.NonZero)
 
 
-def volume_by_meshes(bodies: Sequence[Manifold], tools: Sequence[Manifold]) -> float:
-    """Volume of a union without tools, by booleans of meshes: another way to the same figure."""
+def mesh_difference(bodies: Sequence[Manifold], tools: Sequence[Manifold]) -> Manifold:
+    """A union without tools: another way to the same solid."""
     union = Manifold.batch_boolean(bodies, OpType.Add)
-    return float(Manifold.batch_boolean([union, *tools], OpType.Subtract).volume())
+    return Manifold.batch_boolean([union, *tools], OpType.Subtract)
+
+
+def mesh_of(body: Manifold) -> Mesh:
+    """Vertices and triangles of the result of booleans."""
+    net = body.to_mesh64()
+    return Mesh(np.asarray(net.vert_properties)[:, :3], np.asarray(net.tri_verts, dtype=np.int64))
 
 
 def volume_by_cut_mesh(

@@ -136,7 +136,8 @@ class PrototypeLayout:
     """Balls on a base that turns about the ellipsoid's axis, k balls for m mirrors.
 
     At base angle b ball j is at azimuth placement.azimuth[j] + b; positions are in the frame of
-    the shell (z up), as are those of the mirrors.
+    the shell (z up), as are those of the mirrors. They are those under weight, on the mean over the
+    pictures of each ball.
     """
 
     spec: Spec  # of the design, with the number of balls
@@ -150,6 +151,9 @@ class PrototypeLayout:
     # mirror of camera b, by number, whose direction mirror i shows when the object is turned by 180
     # degrees about z, (m,)
     twin: Ints
+    # displacement of the balls by weight on the mean over their pictures, with the base at angle
+    # zero, mm, (k, 3); zero until it is known
+    sag: Floats = field(default_factory=lambda: np.zeros(3))
 
     def __len__(self) -> int:
         return len(self.balls)
@@ -179,6 +183,10 @@ class PrototypeLayout:
     def bought_grade(self, place: int) -> str:
         """The grade that a ball is bought in, by its place in the catalogue."""
         return self.balls.catalogue.balls[place].bought_grade(self.spec.prototype.grade) or ""
+
+    def seated_centres(self) -> Floats:
+        """Where the seats have these spheres as the base is made, without weight, mm, (k, 3)."""
+        return self.body_centres() - self.sag
 
     @property
     def mass_g(self) -> float:

@@ -109,7 +109,7 @@ def seat_layout(spec: BaseSpec, prototype: PrototypeLayout) -> Seats:
     )
     bottom = radius + spec.magnet_gap_mm + height
     seats = Seats(
-        centre=prototype.body_centres(),
+        centre=prototype.seated_centres(),
         radius=radius,
         axes=axes,
         cup=cup,

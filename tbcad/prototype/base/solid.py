@@ -12,13 +12,14 @@ gaps is left out too when it is short.
 from collections.abc import Callable
 
 import numpy as np
+from manifold3d import Manifold
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.cad.kernel.checks import COARSE_MM, SolidProperties, checked
 from tbcad.cad.kernel.glyphs import fitting_height, relief
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.cad.kernel.meshing import as_manifold, moved_mesh, volume_by_meshes
+from tbcad.cad.kernel.meshing import as_manifold, mesh_difference, mesh_of, moved_mesh
 from tbcad.cad.kernel.solids import (
     cut,
     cylinder,
@@ -196,14 +197,7 @@ def carrier_solid(
     """
     seats = base.local_seats
     added, removed = added_solids(base, seats, split), removed_solids(base, seats)
-    hollows = [
-        moved_mesh(seat_hollow_mesh(seats, k, seats.pad_offset), seats.axes[k], seats.centre[k])
-        for k in range(len(seats))
-    ]
-    bodies, others = (
-        [as_manifold(one, COARSE_MM) for one in some] for some in (added, removed[len(seats) :])
-    )
-    expected = volume_by_meshes(bodies, [*hollows, *others])
+    expected = mesh_difference(*_meshes(seats, added, removed[len(seats) :])).volume()
     contacts, pads = seats.contacts.reshape(-1, 3), np.repeat(seats.pad, 3)
     errors = []
     for same in SAME_MM:
@@ -213,6 +207,26 @@ def carrier_solid(
         except InvalidSolidError as error:
             errors.append(error)
     raise errors[0]
+
+
+def carrier_mesh(base: BaseLayout, split: BaseSplit = UNCUT) -> Mesh:
+    """The carrier in the frame of the shell by booleans of meshes, before its solid is built."""
+    seats = base.local_seats
+    added, others = added_solids(base, seats, split), _paths_and_holes(base, seats)
+    net = mesh_of(mesh_difference(*_meshes(seats, added, others)))
+    return Mesh(net.vertices @ base.axes, net.triangles)
+
+
+def _meshes(
+    seats: Seats, added: list[TopoDS_Shape], others: list[TopoDS_Shape]
+) -> tuple[list[Manifold], list[Manifold]]:
+    """Meshes of what is added, and of what is cut out: the hollows of the seats and others."""
+    hollows = [
+        moved_mesh(seat_hollow_mesh(seats, k, seats.pad_offset), seats.axes[k], seats.centre[k])
+        for k in range(len(seats))
+    ]
+    bodies, tools = ([as_manifold(one, COARSE_MM) for one in some] for some in (added, others))
+    return bodies, [*hollows, *tools]
 
 
 def added_solids(base: BaseLayout, seats: Seats, split: BaseSplit = UNCUT) -> list[TopoDS_Shape]:
@@ -231,7 +245,11 @@ def added_solids(base: BaseLayout, seats: Seats, split: BaseSplit = UNCUT) -> li
 def removed_solids(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
     """What is cut out of that union: first the hollows of all seats, then paths and holes."""
     hollows = _at_seats(seats, lambda seats, k: seat_hollow(seats, k, seats.pad_offset))
-    return [*hollows, *_at_seats(seats, insertion_path), *hub_holes(base.hub, base.spec)]
+    return [*hollows, *_paths_and_holes(base, seats)]
+
+
+def _paths_and_holes(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
+    return [*_at_seats(seats, insertion_path), *hub_holes(base.hub, base.spec)]
 
 
 def _at_seats(seats: Seats, solid: Callable[[Seats, int], TopoDS_Shape]) -> list[TopoDS_Shape]:

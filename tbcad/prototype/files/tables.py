@@ -27,7 +27,8 @@ def ball_rows(layout: PrototypeLayout) -> list[Row]:
     """One row for each ball, in the order of BALL_COLUMNS, numbered from 1.
 
     p is the apex, n the inward normal there, c the centre of the reflecting sphere and b that of
-    the sphere in the seat, mm, in the frame of the shell with the base at angle zero. Diameter is
+    the sphere in the seat, mm, in the frame of the shell with the base at angle zero. b is as the
+    base is made; weight brings it to its place by sag, on the mean over its pictures. Diameter is
     the body's. A coverage is the minimum over all mirrors that the ball replaces, within cells that
     move with the ball and within fixed ones; pixels are sums over them. A cap has no grade and no
     mass: those depend on how it is made.
@@ -53,7 +54,7 @@ def _names(layout: PrototypeLayout, j: int) -> list[Cell]:
 
 
 def _pose(layout: PrototypeLayout) -> Floats:
-    """Radii, angles, apex, normal and both centres, (k, 16)."""
+    """Radii, angles, apex, normal, both centres and sag, (k, 19)."""
     balls = layout.balls
     table: Floats = np.column_stack(
         [
@@ -64,7 +65,8 @@ def _pose(layout: PrototypeLayout) -> Floats:
             layout.apices(),
             layout.normals(),
             layout.centres(),
-            layout.body_centres(),
+            layout.seated_centres(),
+            np.broadcast_to(layout.sag, (len(layout), 3)),
         ]
     )
     return table + 0.0  # no negative zeros

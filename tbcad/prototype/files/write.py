@@ -37,7 +37,7 @@ from tbcad.prototype.fasteners import Fastener, fastener_axes, fastener_componen
 from tbcad.prototype.files import bom, controllers, tables
 from tbcad.prototype.files.record import BALLS_FILE, GLB, STEP, prototype_record
 from tbcad.prototype.frame.stock import Stock
-from tbcad.prototype.gravity.sag import weighed_base, write_sag
+from tbcad.prototype.gravity.sag import write_sag
 from tbcad.prototype.light.shroud import pattern
 from tbcad.prototype.model import build_prototype_model
 from tbcad.prototype.printed import PrintedPart, Role, component_solid, part_mesh, print_estimate
@@ -91,8 +91,8 @@ def export_prototype(
     groups = [group for group in assembly_groups(built) if group.bodies]
     meshes = coloured_meshes(groups)
     submit(write_glb, folder / GLB, "prototype", meshes)
-    if base := weighed_base(built, meshes):
-        submit(write_sag, folder, base)
+    if built.sag:
+        submit(write_sag, folder, built.sag)
     write_assembly(folder / STEP, "prototype", groups)
     bill = _bill(built, [estimate.result() for estimate in prints], prices)
     write_table(folder / bom.NAME, bom.COLUMNS, bill)
@@ -161,7 +161,7 @@ def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
     Coupons are tools and left out. What light passes through is included to be looked at, and
     transparent: the capture sphere, and what the camera sees.
     """
-    layout, centre = prototype.layout, prototype.layout.body_centres()
+    layout, centre = prototype.layout, prototype.layout.seated_centres()
     balls = (
         ColouredSolid(f"ball_{k + 1}", sphere(centre[k], float(layout.balls.body_radius[k])), STEEL)
         for k in (~layout.balls.cap).nonzero()[0].tolist()

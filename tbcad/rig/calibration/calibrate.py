@@ -47,7 +47,7 @@ class Setup:
     export: ExportedDesign
     plan: Plan
     frames: tuple[Frame, ...]  # that are photographed, in the order of the machine's
-    designed: Machine  # the machine, at the angles of these frames
+    designed: Machine  # the machine without weight, at the angles of these frames
     lens: CalibratedLens | None = None  # of its camera, where it is known
     geometry: Geometry = "prototype"
 
@@ -110,7 +110,8 @@ def prepared_setup(
         )
     angle = np.radians([frame.base_angle_deg for frame in frames])
     camera = machine.camera if lens is None else lens.on(machine.camera)
-    machine = replace(machine, angle=angle, camera=camera)
+    seated = machine.centre - plan.sag  # weight is of each frame
+    machine = replace(machine, angle=angle, camera=camera, centre=seated)
     return Setup(export, plan, frames, machine, lens, geometry)
 
 

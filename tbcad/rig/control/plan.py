@@ -18,7 +18,7 @@ from tbcad.records.prototype import NAME as RECORD
 from tbcad.records.prototype import Prototype
 from tbcad.records.prototype_drive import Phase
 from tbcad.records.run import Frame
-from tbcad.records.tables import BallRow, MirrorRow, PictureRow, StopRow
+from tbcad.records.tables import BallRow, MirrorRow, PictureRow, SagRow, StopRow
 from tbcad.rig.runs import export_digests
 
 SETTINGS, STEPPER = "grbl_settings.txt", "MANUAL_STEPPER STEPPER=base"
@@ -175,7 +175,7 @@ def read_control_plan(folder: Path) -> ControlPlan:
     program, settings = read_program(folder, firmware), () if firmware == KLIPPER else (SETTINGS,)
     angles = _angles(folder, program)
     return ControlPlan(
-        sha256=export_digests(folder, (*FILES, _words(firmware).file, *settings)),
+        sha256=export_digests(folder, (*FILES, _words(firmware).file, *settings), [SagRow.FILE]),
         size_px=(design.cameras[0].width_px, design.cameras[0].height_px),
         firmware=firmware,
         axis=controller.axis,

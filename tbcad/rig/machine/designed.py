@@ -211,7 +211,7 @@ def random_build(
     designed: Machine, plan: Plan, errors: Errors, seed: int, *, gravity: Gravity
 ) -> BuiltPrototype:
     """The first simulated build, the same that `tbcad tolerance` has, with a real lens and LEDs."""
-    draws = draw_prototypes(errors, seed, [0], is_cap(plan), gravity.wind_up)
+    draws = draw_prototypes(errors, seed, [0], is_cap(plan), gravity)
     moved = sag_motion(designed, np.tile(gravity.sagged(draws.sag[0]), (RUNS, 1, 1)))
     across = plan.frame[1:]
     other = draw_other_errors(len(designed.leds), seed)

@@ -33,6 +33,7 @@ from tbcad.records.run import (
     PhaseTimes,
     RunRecord,
 )
+from tbcad.records.tables import SagRow, StopRow
 from tbcad.rig.machine.designed import (
     BuiltPrototype,
     designed_build,
@@ -62,6 +63,11 @@ DEPENDS_ON: dict[Geometry, tuple[str, ...]] = {
     "prototype": (*MIRRORS, "prototype.json", "balls.csv", "rotation_plan.csv"),
     "shell": MIRRORS,
 }
+BY_WEIGHT: dict[Geometry, tuple[str, ...]] = {
+    "prototype": (StopRow.FILE, SagRow.FILE),
+    "shell": (),
+}
+"""Files that it depends on too where an export has them."""
 PNG_LEVEL = 1
 # Of a simulated camera there is no clock: photographs follow each other from here.
 BEGIN = datetime(2022, 11, 1, tzinfo=UTC)
@@ -209,7 +215,7 @@ def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Pat
     camera, frames = runs[0].built.machine.camera, tuple(f for run in runs for f in run.frames)
     geometry: Geometry = "prototype" if len(runs) == 1 else "shell"
     return RunRecord(
-        export_sha256=export_digests(export, DEPENDS_ON[geometry]),
+        export_sha256=export_digests(export, DEPENDS_ON[geometry], BY_WEIGHT[geometry]),
         source="simulated",
         camera=CAMERA,
         width_px=camera.width_px,

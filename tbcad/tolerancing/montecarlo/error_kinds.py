@@ -76,6 +76,11 @@ class Errors:
     ridge_rounding: Error = NO_ERROR  # of the fillets there that a mandrel's ridges leave
 
     @property
+    def weight(self) -> float:
+        """Share of the mean sag that acts, and that seats are placed against: 1 with gravity."""
+        return min(self.sag.mean, 1.0)
+
+    @property
     def axis_wobble(self) -> Error:
         """Direction of the base at a stop, by run-outs of both bearings, one against the other."""
         return replace(self.axis_runout, spread=self.axis_runout.spread * sqrt(2) / BEARINGS_MM)

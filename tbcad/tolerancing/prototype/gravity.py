@@ -1,6 +1,6 @@
 """What gravity does to a prototype at its stops, as its build worked it out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.prototype.gravity.sag import read_sag
-from tbcad.records.tables import StopRow
+from tbcad.records.tables import BallRow, SagRow, StopRow
 from tbcad.types import Floats
 
 
@@ -21,6 +21,9 @@ class Gravity:
     # displacements of balls in the base's frame at angle zero: as the carrier bends, and as what
     # holds its hub does, mm, (2, t, k, 3)
     sag: Floats
+    # on the mean over each ball's pictures: seats are made so much beside the places of their
+    # balls, mm, (k, 3)
+    mean: Floats
 
     def sagged(self, share: Floats) -> Floats:
         """Displacements with shares (..., 2) of both, mm, (..., t, k, 3)."""
@@ -28,9 +31,9 @@ class Gravity:
 
 
 def weightless(plan: Plan) -> Gravity:
-    """Without gravity."""
-    stops = len(plan.angle)
-    return Gravity(np.zeros(stops), np.zeros((2, stops, len(plan), 3)))
+    """Without gravity, and with seats where the balls are to be."""
+    stops, balls = len(plan.angle), len(plan)
+    return Gravity(np.zeros(stops), np.zeros((2, stops, balls, 3)), np.zeros((balls, 3)))
 
 
 def read_gravity(export: ExportedDesign, plan: Plan) -> Gravity:
@@ -38,7 +41,7 @@ def read_gravity(export: ExportedDesign, plan: Plan) -> Gravity:
 
     Motor and belt yield to the base's weight: see tbcad.prototype.drive.drive; carrier and frame
     bend: see tbcad.prototype.gravity. InputError if a file is missing, malformed, or of another
-    plan.
+    plan, or seats are placed against weight that no file tells.
     """
     path, none = export.folder / StopRow.FILE, weightless(plan)
     rows = StopRow.read(export.folder)
@@ -48,7 +51,13 @@ def read_gravity(export: ExportedDesign, plan: Plan) -> Gravity:
         )
     wind_up = np.radians([row.wind_up_deg for row in rows])
     found = read_sag(export.folder)
+    if found is None and np.any(plan.sag):
+        raise InputError(
+            f"{export.folder / SagRow.FILE} is not there, and the seats of {BallRow.FILE} are "
+            f"placed against weight: {REBUILD}"
+        )
     if found is None:
-        return Gravity(wind_up, none.sag)
+        return replace(none, wind_up=wind_up)
     carrier = found.of["carrier"]
-    return Gravity(wind_up, np.stack([carrier, found.whole - carrier]) @ found.axes)
+    sag = np.stack([carrier, found.whole - carrier]) @ found.axes
+    return Gravity(wind_up, sag, plan.sag)

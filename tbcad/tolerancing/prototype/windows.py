@@ -52,7 +52,9 @@ class PrototypeDraws:
     """
 
     radius: Floats  # by which balls are too large, mm, (s, k)
-    seat: Floats  # of the balls' centres on the base, mm, (s, k, 3)
+    # of the balls' centres on the base without weight, which seats are placed against, mm,
+    # (s, k, 3)
+    seat: Floats
     cap_tilt: Floats  # of caps about two axes across their own, radians, (s, k, 2)
     angle: Floats  # of the base at stops of both runs, with gravity, radians, (s, 2, t)
     runout: Floats  # of the axis there, along azimuth zero and across it, mm, (s, 2, t, 2)
@@ -73,15 +75,15 @@ class PrototypeDraws:
 
 
 def draw_prototypes(
-    errors: Errors, seed: int, builds: Sequence[int], is_cap: Bools, wind_up: Floats
+    errors: Errors, seed: int, builds: Sequence[int], is_cap: Bools, gravity: Gravity
 ) -> PrototypeDraws:
     """Errors of some prototypes; see tbcad.tolerancing.montecarlo.draws.draw_kinds.
 
-    Purchased balls have the errors of their grade, caps (k,) those of a mirror that is a part of
-    its own (`Errors.whole_radius`), each with its centre unchanged, and those of a cap's form.
-    Gravity turns the base at the t stops of one run by the wind-up, radians, (t,).
+        Purchased balls have the errors of their grade, caps (k,) those of a mirror that is a part of
+        its own (`Errors.whole_radius`), each with its centre unchanged, and those of a cap's form.
+    Gravity is that at the t stops of one run.
     """
-    k, t = len(is_cap), len(wind_up)
+    k, t = len(is_cap), len(gravity.wind_up)
     shapes: dict[str, Shape] = {  # in the order of the random streams; only append to it
         "ball_radius": (k,),
         "sphere_radius": (k,),
@@ -103,9 +105,9 @@ def draw_prototypes(
     drawn = draw_kinds(errors, seed, builds, shapes, FIRST_STREAM)
     return PrototypeDraws(
         radius=np.where(is_cap, drawn["sphere_radius"], drawn["ball_radius"]),
-        seat=drawn["seat"],
+        seat=drawn["seat"] - errors.weight * gravity.mean,
         cap_tilt=np.where(is_cap[:, None], drawn["cap_tilt"], 0.0),
-        angle=drawn["rotation_angle"] + drawn["wind_up"][:, None, None] * wind_up,
+        angle=drawn["rotation_angle"] + drawn["wind_up"][:, None, None] * gravity.wind_up,
         runout=drawn["axis_runout"],
         wobble=drawn["axis_wobble"],
         power=np.where(is_cap, drawn["cap_sagitta"], 0.0),
@@ -154,7 +156,7 @@ class PrototypeWindows:
     @cached_property
     def designed_rays(self) -> list[tuple[Floats, Floats]]:
         """Of each run without errors: see `_middle_rays`."""
-        exact = draw_prototypes(Errors(), 0, [0], self.is_cap, self.gravity.wind_up)
+        exact = draw_prototypes(Errors(), 0, [0], self.is_cap, self.gravity)
         return [_middle_rays(run, run_pose(self, exact, 0, k)) for k, run in enumerate(self.runs)]
 
 
@@ -216,7 +218,7 @@ class PrototypeCase:
     def __call__(self, builds: range) -> PrototypeResult:
         """Result of the builds of these numbers."""
         model = self.model
-        draws = draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.gravity.wind_up)
+        draws = draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.gravity)
         return prototype_result(model, draws)
 
 

@@ -13,7 +13,7 @@ from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.checks import plane_faces, volume
 from tbcad.cad.kernel.glyphs import ROWS, SIGNS, fitting_height
-from tbcad.cad.kernel.meshing import volume_by_meshes
+from tbcad.cad.kernel.meshing import mesh_difference
 from tbcad.cad.kernel.solids import fused, moved, solids
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.design import PrinterSpec
@@ -277,7 +277,8 @@ class TestPieces:
         removed = [manifold(one, 0.01) for one in removed_solids(base, seats)]
         added = (added_solids(base, seats, by) for by in (plan, UNCUT))
         whole, without = (
-            volume_by_meshes([manifold(one, 0.01) for one in some], removed) for some in added
+            mesh_difference([manifold(one, 0.01) for one in some], removed).volume()
+            for some in added
         )
         assert whole > without + 10_000
         assert volume(carrier_solid(base, MESH_MM, plan)[0]) == pytest.approx(whole, rel=2e-4)

@@ -5,7 +5,8 @@ import pytest
 
 from tbcad.core.geometry.rotations import rotated_about_x
 from tbcad.prototype.gravity.compliance import rigid_motion
-from tbcad.prototype.gravity.sag import LEFT, Sag, moved_by
+from tbcad.prototype.gravity.sag import LEFT, Sag
+from tbcad.prototype.gravity.weighed import moved_by
 from tbcad.types import Floats
 
 ANGLE = np.radians([-100.0, -31.0, 0.0, 55.0, 101.0])

@@ -1,6 +1,7 @@
 """The folder of a simulated run, and what is refused."""
 
 import hashlib
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.options.machines import SimulateRunOptions
 from tbcad.rig.machine.machine import TRUTH, read_machine
-from tbcad.rig.runs import read_photograph, read_run
+from tbcad.rig.runs import check_same_export, read_photograph, read_run
 from tbcad.rig.simulated_run import simulate
 from tbcad.rig.simulated_run.photographs import SimulatedRun
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
@@ -62,6 +63,22 @@ def test_photographs_are_not_replaced(small: Small, export_folder: Path, tmp_pat
     with pytest.raises(InputError, match="holds files, and photographs are not replaced"):
         simulate.write_run((small.run,), PHASES, export_folder, tmp_path, lambda _: None)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_a_run_depends_on_the_weight_of_its_export(
+    small: Small, export_folder: Path, tmp_path: Path
+) -> None:
+    """A run without the file is read with any."""
+    folder = Path(shutil.copytree(export_folder, tmp_path / "export"))
+    (folder / "sag.csv").unlink(missing_ok=True)
+    without = simulate._record((small.run,), PHASES, folder)
+    (folder / "sag.csv").write_text("one")
+    record = simulate._record((small.run,), PHASES, folder)
+    check_same_export(tmp_path, record, folder)
+    (folder / "sag.csv").write_text("of a stiffer carrier")
+    check_same_export(tmp_path, without, folder)
+    with pytest.raises(InputError, match=r"sag\.csv is not the file that .* was photographed with"):
+        check_same_export(tmp_path, record, folder)
 
 
 def test_nothing_is_left_of_a_run_that_fails(

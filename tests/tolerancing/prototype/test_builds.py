@@ -15,7 +15,7 @@ from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.tolerancing.montecarlo.builds import simulate
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.prototype.gravity import Gravity
+from tbcad.tolerancing.prototype.gravity import Gravity, weightless
 from tbcad.tolerancing.prototype.windows import (
     PrototypeCase,
     PrototypeDraws,
@@ -70,7 +70,8 @@ def model(small_design: MirrorDesign, plan: Plan) -> PrototypeWindows:
 def gravity_at(plan: Plan) -> Gravity:
     down = np.stack([np.cos(plan.angle), np.sin(plan.angle)])
     bends = np.random.default_rng(1).normal(0, 0.2, (2, 2, len(plan), 3))
-    return Gravity(4e-3 * np.sin(plan.angle), np.einsum("wt,pwkx->ptkx", down, bends))
+    sag = np.einsum("wt,pwkx->ptkx", down, bends)
+    return Gravity(4e-3 * np.sin(plan.angle), sag, sag.sum(axis=0).mean(axis=0))
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +80,7 @@ def runs(small_design: MirrorDesign, plan: Plan) -> Runs:
 
 
 def draws_of(model: PrototypeWindows, count: int, **errors: Error) -> PrototypeDraws:
-    return draw_prototypes(Errors(**errors), 7, range(count), model.is_cap, model.gravity.wind_up)
+    return draw_prototypes(Errors(**errors), 7, range(count), model.is_cap, model.gravity)
 
 
 @pytest.fixture(scope="module")
@@ -257,3 +258,22 @@ def test_later_builds_continue_earlier_ones(model: PrototypeWindows) -> None:
     whole, later = simulate(case, 23), simulate(case, 6, first=17)
     for field in fields(PrototypeResult):
         assert (getattr(later, field.name) == getattr(whole, field.name)[17:]).all()
+
+
+def test_seats_against_weight_bring_balls_to_their_places(
+    small_design: MirrorDesign, plan: Plan
+) -> None:
+    """Weight that is the same at all stops costs nothing where seats are placed against it."""
+    mean = np.random.default_rng(2).normal(0, 1.0, (len(plan), 3))
+    stops = len(plan.angle)
+    sag = np.broadcast_to(mean / 2, (2, stops, len(plan), 3))
+    results = []
+    for seats in (mean, 0 * mean):
+        gravity = Gravity(np.zeros(stops), sag, seats)
+        model = prototype_model(reflectors(small_design), plan, gravity)
+        draws = draws_of(model, 1, sag=Error(mean=1.0))
+        results.append(prototype_result(model, draws).calibrated_coverage.min())
+    model = prototype_model(reflectors(small_design), plan, weightless(plan))
+    designed = prototype_result(model, draws_of(model, 1)).calibrated_coverage.min()
+    assert results[0] == pytest.approx(designed, abs=1e-9)
+    assert results[1] < designed - 0.3

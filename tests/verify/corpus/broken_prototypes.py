@@ -66,6 +66,18 @@ def half_the_carriers(rows: Rows) -> None:
         one.update({k: str(float(v) / 2) for k, v in one.items() if k.startswith("carrier")})
 
 
+def against_the_seats(rows: Rows) -> None:
+    """Weight that moves all balls the other way."""
+    for one in rows:
+        one.update({k: str(-float(v)) for k, v in one.items() if k.startswith("sag")})
+
+
+def more_of_the_shaft(rows: Rows) -> None:
+    """All balls half a millimetre lower at all stops."""
+    for one in rows:
+        one.update(shaft_z_mm=str(float(one["shaft_z_mm"]) - 0.5))
+
+
 def redrawn(name: str, how: Callable[[Any], object]) -> Job:
     """Change the entities of a DXF."""
 
@@ -401,6 +413,10 @@ FAILING: Broken = {
     ("sag as written", SAG): {
         "sag: half as much": (table(SAG, half_the_carriers), "root mean square"),
         "sag: bent below the hub": (row(SAG, 4, shaft_x_mm=0.5), "bend the base"),
+    },
+    ("balls under weight", SAG): {
+        "sag: seats on the wrong side": (table(BALLS, against_the_seats), "ball "),
+        "sag: a weaker shaft": (table(SAG, more_of_the_shaft), "ball "),
     },
     ("camera gauge", RECORD): {
         "gauge: a mark aside": (record("camera_place/marks_mm/0/0/1", plus(0.1)), "is no corner"),

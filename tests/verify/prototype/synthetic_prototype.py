@@ -273,6 +273,7 @@ def ball_rows(balls: list[Ball]) -> list[dict[str, Any]]:
         row |= {"polar_deg": polar, "azimuth_deg": azimuth}
         for name, v in {"p": ball.p, "n": ball.n, "c": ball.c, "b": ball.b}.items():
             row |= {name + axis: x for axis, x in zip("xyz", (v + 0.0).tolist(), strict=True)}
+        row |= dict.fromkeys(("sag_x_mm", "sag_y_mm", "sag_z_mm"), 0.0)
         out.append(row)
     return out
 

@@ -13,7 +13,7 @@ from OCP.gp import gp_Pnt
 from tbcad_verify.mesh.mesh import Mesh, join_meshes, mass_properties
 from tbcad_verify.mesh.stl import parse
 from tbcad_verify.mesh.vectors import cross, dot, norm
-from tbcad_verify.prototype import balls_apart, seats, swing
+from tbcad_verify.prototype import balls_apart, sag_checks, seats, swing
 from tbcad_verify.prototype.assembly import assembly_meshes, part_step_checks
 from tbcad_verify.prototype.bodies import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.caps import measure_cap
@@ -110,6 +110,47 @@ def test_balls_keep_the_wall_between_them(
     some = replace(measured, body=body, body_radius=np.full(4, 5.0))
     (check,) = balls_apart.checks(check_names(balls_apart.CHECKS, "x.stl"), some)
     assert (check.passed, check.measured) == (passes, pytest.approx(away))
+
+
+def test_a_mean_is_over_the_pictures_of_each_ball(context: PrototypeContext) -> None:
+    """By a sum over the rows of the plan."""
+    plan, stops = context.prototype.plan, len(context.prototype.stops)
+    moved = np.random.default_rng(3).standard_normal((stops, len(context.prototype.balls), 3))
+    found = sag_checks._mean(context, moved)
+    for ball in set(plan.ball.tolist()):
+        mine = plan.stop[plan.ball == ball] - 1
+        assert found[ball - 1] == pytest.approx(moved[mine, ball - 1].mean(axis=0))
+
+
+def test_balls_are_where_weight_brings_them_from_their_seats(measured: MeasuredPrototype) -> None:
+    """Seats as they were measured, with a weight that the record knows or not."""
+    (name,) = check_names({"balls under weight": "mm"}, "sag.csv")
+    sag = np.tile([[0.3], [0.0], [-0.6]], measured.seated.shape[1])
+    assert sag_checks._beside(name, measured.context, measured, 0.0).passed
+    wrong = sag_checks._beside(name, measured.context, measured, sag)
+    assert (wrong.passed, wrong.measured) == (False, pytest.approx(np.hypot(0.3, 0.6), abs=1e-4))
+    there = replace(measured, seated=measured.seated - sag)
+    assert sag_checks._beside(name, measured.context, there, sag).passed
+
+
+def test_all_that_turns_is_moved_as_weight_moves_the_balls(
+    context: PrototypeContext, measured: MeasuredPrototype
+) -> None:
+    """A ray straight down meets the base so much lower."""
+    balls = context.prototype.balls
+    lower = {"sag_z_mm": np.full(len(balls), -0.5), "cz": balls.cz - 0.5}
+    balls = balls.model_copy(update=lower)
+    record = context.prototype.model_copy(update={"balls": balls})
+    sagged = measured_of(replace(context, prototype=record))
+    shift = np.array([[0.0], [0.0], [-0.5]])
+    assert sagged.centre == pytest.approx(measured.centre + shift)
+    assert sagged.seated == pytest.approx(measured.seated)
+    down = np.tile([[0.0], [0.0], [-1.0]], measured.body.shape[1])
+    above = measured.body + 50 * -down
+    (hit, before), (same, after) = (one.rotating.first(above, down) for one in (measured, sagged))
+    assert (hit >= 0).any()
+    assert same.tolist() == hit.tolist()
+    assert after[hit >= 0] == pytest.approx(before[hit >= 0] + 0.5, abs=1e-4)
 
 
 def test_pads_are_found_without_the_contacts_being_right(context: PrototypeContext) -> None:

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 from tbcad_verify.mesh.mesh import indexed_mesh
-from tbcad_verify.prototype.bricks import POISSON, STEP_MM, Bricks, fill_bricks, shapes
+from tbcad_verify.prototype.bricks import (
+    ASIDE,
+    POISSON,
+    STEP_MM,
+    Bricks,
+    _inside,
+    fill_bricks,
+    shapes,
+)
 from tbcad_verify.prototype.sag_checks import _without_motions
 from tbcad_verify.record.prototype import SagTable
 from trimesh.creation import box
@@ -46,6 +54,19 @@ def test_walls_are_solid_and_the_rest_is_infill() -> None:
     """Of a square of 20 mm a wall of 1.65 mm is 30.3 % of the area."""
     share = bar(0.25).share.sum() / bar().share.sum()
     assert share == pytest.approx(0.303 + 0.697 * 0.25, abs=0.08)
+
+
+def test_a_ray_along_the_edge_of_a_steep_facet_comes_to_an_end() -> None:
+    """In single precision it is met again and again, from beyond it (of a carrier for n = 18)."""
+    corners = [[61.95352103, -16.88250312, 91.56397583], [62.51872591, -11.51321109, 87.51669862]]
+    corners += [[62.06945618, -13.3385678, 107.47922069], [30.0, -13.0, 92.0]]
+    faces = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]], np.int32)
+    mesh = indexed_mesh(np.array(corners, np.float32).astype(float), faces)
+    at = np.array([62.22801668, -14.03145469])
+    for aside in np.linspace(-2e-5, 2e-5, 41):
+        start = at + aside - (0.5 + ASIDE[:, 0]) * STEP_MM
+        inside = _inside(mesh, np.array([*start, 80.0]), np.array([1, 1, 20]))
+        assert inside.sum() <= 3
 
 
 def test_motions_of_the_whole_base_are_taken_out() -> None:

@@ -31,7 +31,8 @@ Row = dict[str, Any]
 
 # Checks that are unknown where a ball's stop is, and where its place is.
 ON_STOPS = ("cells", "coverage, balls", "light paths, balls", "rays, balls", "pixels, balls")
-ON_BALLS = (*ON_STOPS, "swing", "swing clearance", "balls apart", "sag left", "sag as written")
+SAG = "sag left", "sag as written", "balls under weight"
+ON_BALLS = (*ON_STOPS, "swing", "swing clearance", "balls apart", *SAG)
 
 
 def failures(folder: Path) -> dict[str, Check]:

@@ -216,7 +216,7 @@ def seat_errors(context: PrototypeContext, machine: AsBuilt) -> SeatErrors:
     """
     balls = context.prototype.balls
     growth = np.where(balls.cap, machine.radius - balls.radius_mm, 0.0) * balls.columns("nx", 3)
-    designed, found = balls.columns("cx", 3), machine.centre + growth
+    designed, found = balls.columns("cx", 3) - balls.sag, machine.centre + growth
     turn, shift = _motion(designed, found)
     placed = turn.apply(designed.T).T + shift[:, None]
     off = turn.inv().apply((found - placed).T).T

@@ -6,8 +6,8 @@ GLB, whose bodies are compared with the parts' own files.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -144,15 +144,17 @@ def some_angles(context: PrototypeContext) -> Floats:
 
 @dataclass(frozen=True)
 class MeasuredPrototype:
-    """The prototype as its files define it, seen from its base at angle zero.
+    """The prototype as its files define it, seen from its base at angle zero, under weight.
 
-    Pinhole and capture sphere lie on the axis, so they stay where they are.
+    All that turns is moved by the recorded displacements of the balls on the mean over their
+    pictures. Pinhole and capture sphere lie on the axis, so they stay where they are.
     """
 
     context: PrototypeContext  # the record
     centre: Floats  # (3, K) of the reflecting spheres, mm
     radius: Floats  # (K,) of them, mm
     body: Floats  # (3, K) centres of the spheres that lie on the pads, mm
+    seated: Floats  # (3, K) the same without weight, mm
     body_radius: Floats  # (K,) mm
     mirrors: PreparedSurfaces  # the reflecting spheres, for rays from the pinhole
     rotating: BodyScene  # base, caps, and what is fastened to them
@@ -168,6 +170,8 @@ def measure_prototype(
 ) -> MeasuredPrototype:
     """Put balls on their pads, and caps as they were measured; what is bought is as drawn.
 
+    Weight then moves balls and caps as recorded, and the rest as fits them best.
+
     Unknown: a centre, a cap or a mesh is not known.
     """
     balls = context.prototype.balls
@@ -182,18 +186,43 @@ def measure_prototype(
         # The cap's body lies on the pads, wherever the cap's own file has it.
         centre[:, cap.ball] += cap.front.centre - cap.body.centre
         radius[cap.ball], body_radius[cap.ball] = cap.front.radius, cap.body.radius
+    centre, seated, moved = centre + balls.sag, body, _under_weight(context, body)
     normal = unit(balls.columns("nx", 3))
     surfaces = Surfaces(centre + radius * normal, normal, 1 / radius)
     bought = drawn.keys() - {*VIEWS, *OWN, *(part.part.name for part in parts)}
     bought = {name for name in bought if not name.startswith("ball_")}
     swung = turning(context, ())
+    turned = placed_meshes(of_roles(parts, *SWUNG)) | _meshes(drawn, sorted(bought & swung))
     return MeasuredPrototype(
         context,
         centre,
         radius,
-        body,
+        seated + balls.sag,
+        seated,
         body_radius,
         prepare_for_rays(context.pinhole, surfaces),
-        body_scene(placed_meshes(of_roles(parts, *SWUNG)) | _meshes(drawn, sorted(bought & swung))),
+        body_scene({name: moved(name, mesh) for name, mesh in turned.items()}),
         body_scene(placed_meshes(of_roles(parts, *STILL)) | _meshes(drawn, sorted(bought - swung))),
     )
+
+
+def _under_weight(context: PrototypeContext, body: Floats) -> Callable[[str, Mesh], Mesh]:
+    """How a mesh is moved, by its name: a cap as its ball, all else as fits balls (3, K) best."""
+    balls, parts = context.prototype.balls, context.prototype.parts
+    fitted = np.linalg.lstsq(rigid_motions(body.T), balls.sag.T.ravel(), rcond=None)[0]
+    of_cap = {part.name: balls.sag[:, part.ball] for part in parts if part.role == "cap"}
+
+    def moved(name: str, mesh: Mesh) -> Mesh:
+        if name in of_cap:
+            return replace(mesh, points=mesh.points + of_cap[name])
+        by = np.cross(fitted[3:], mesh.points) + fitted[:3]
+        return replace(mesh, points=mesh.points + by)
+
+    return moved
+
+
+def rigid_motions(arm: Floats) -> Floats:
+    """(3 N, 6) what a shift and a turn about the origin do at (N, 3)."""
+    turns = np.cross(np.eye(3), arm[:, None]).transpose(0, 2, 1)
+    shifts = np.broadcast_to(np.eye(3), turns.shape)
+    return np.concatenate([shifts, turns], axis=2).reshape(-1, 6)

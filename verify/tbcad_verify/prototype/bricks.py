@@ -23,6 +23,7 @@ STEP_MM = BRICK_MM / ALONG
 WALL_MM = 1.65  # of perimeters and top and bottom layers, which are solid: four widths of a line
 POISSON = 0.37  # of PETG and PLA
 OUTSIDE = 1e-3  # stiffness outside, as a share, so that no node is loose
+LIFT_MM = 1e-4  # of a ray beyond a facet that it has met
 GRIP = 1e4  # stiffness of what holds, N/mm per mm^3
 ASIDE = np.array([[0.0123456789], [0.0234567891]])  # of a column, as a share of a step: off edges
 HALVES = np.array([c for c in np.ndindex(3, 3, 3) if c.count(1) <= 1])  # nodes, in half edges
@@ -102,14 +103,18 @@ def _inside(mesh: Mesh, origin: Floats, shape: Ints) -> Bools:
     start[2] = origin[2] - STEP_MM
     up, winding = np.zeros_like(start), np.zeros((x * y, z + 1), dtype=np.int16)
     up[2] = 1.0
-    rays = np.arange(x * y)
+    rays, before = np.arange(x * y), np.full(x * y, -1)
     while rays.size:
         facet = first_hits(scene, start[:, rays], up[:, rays])
         rays, facet = rays[facet >= 0], facet[facet >= 0]
-        start[2, rays] += distances_to_planes(scene, facet, start[:, rays], up[:, rays])
+        ahead = distances_to_planes(scene, facet, start[:, rays], up[:, rays])
+        start[2, rays] += np.maximum(ahead, 0.0)
         level = np.ceil((start[2, rays] - origin[2]) / STEP_MM - 0.5).clip(0, z).astype(int)
-        np.add.at(winding, (rays, level), np.where(scene.planes[facet, 2] < 0, 1, -1))
-        start[2, rays] += 1e-4
+        # A steep facet may be met again beyond it, for hits are found in single precision.
+        sign = np.where(scene.planes[facet, 2] < 0, 1, -1) * (facet != before[rays])
+        np.add.at(winding, (rays, level), sign)
+        before[rays] = facet
+        start[2, rays] += LIFT_MM
     return np.asarray(np.cumsum(winding, axis=1)[:, :-1].reshape(shape) > 0)
 
 

@@ -11,6 +11,7 @@ from tbcad_verify.mesh.segments import rounding
 from tbcad_verify.mesh.vectors import dot, norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart
+from tbcad_verify.record.prototype import Balls
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most
 from tbcad_verify.types import Floats
 
@@ -50,10 +51,15 @@ def measure_cap(context: PrototypeContext, part: MeasuredPart) -> MeasuredCap:
     """Fit both spheres of a cap. Unknown: there is no such surface, or no mesh."""
     balls, k, mesh = context.prototype.balls, part.part.ball, part.placed_mesh
     front, body = (
-        fit_sphere(mesh, balls.columns(centre, 3)[:, k], float(radius[k]))
-        for centre, radius in (("cx", balls.radius_mm), ("bx", balls.body_radius_mm))
+        fit_sphere(mesh, centre[:, k], float(radius[k])) for centre, radius in _recorded(balls)
     )
     return MeasuredCap(k, front, body)
+
+
+def _recorded(balls: Balls) -> tuple[tuple[Floats, Floats], ...]:
+    """Centres (3, K) and radii (K,) of fronts and of bodies in the seats, without weight, mm."""
+    front = balls.columns("cx", 3) - balls.sag, balls.radius_mm
+    return front, (balls.columns("bx", 3), balls.body_radius_mm)
 
 
 def fit_sphere(mesh: Mesh, centre: Floats, radius: float) -> FittedSphere:
@@ -106,10 +112,9 @@ def checks(
         return []
     balls, made = context.prototype.balls, []
     spheres = [[cap.front for cap in caps], [cap.body for cap in caps]]
-    recorded = ("cx", balls.radius_mm), ("bx", balls.body_radius_mm)
     which = [cap.ball for cap in caps]
-    for name, fits, (key, radius) in zip(names, spheres, recorded, strict=False):
-        centre = np.array([fit.centre for fit in fits]).T - balls.columns(key, 3)[:, which]
+    for name, fits, (place, radius) in zip(names, spheres, _recorded(balls), strict=False):
+        centre = np.array([fit.centre for fit in fits]).T - place[:, which]
         size = np.array([fit.radius for fit in fits]) - radius[which]
         errors = 1000 * np.maximum(norm(centre), np.abs(size))
         over = np.maximum(errors - 1000 * np.array([fit.blur for fit in fits]), 0)

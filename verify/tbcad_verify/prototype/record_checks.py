@@ -49,10 +49,11 @@ def _positions(name: CheckName, context: PrototypeContext) -> Check:
 
     The apex lies on the ellipsoid, at the recorded polar angle and azimuth; the normal is a unit
     vector and bisects the directions to both foci; the reflecting sphere's centre lies on it, one
-    radius behind the apex, and so does that of the body.
+    radius behind the apex, and so does that of the body, once weight has brought it there.
     """
     balls, pinhole = context.prototype.balls, context.pinhole[:, None]
     p, n, c, b = (balls.columns(key, 3) for key in ("px", "nx", "cx", "bx"))
+    b = b + balls.sag
     double_a = 2 * np.sqrt(context.export.semi_minor_mm**2 + (context.pinhole**2).sum() / 4)
     polar, azimuth = polar_and_azimuth(context.frame, p)
     errors = np.max(
@@ -79,6 +80,7 @@ def _size_faults(context: PrototypeContext) -> Iterator[str]:
     balls = context.prototype.balls
     radius, body, half = balls.radius_mm, balls.body_radius_mm, balls.diameter_mm / 2
     p, c, b = (balls.columns(key, 3) for key in ("px", "cx", "bx"))
+    b = b + balls.sag
     good = np.abs(body - half) <= POSE_MM
     density, (least, most) = balls.mass_g / (np.pi / 6 * balls.diameter_mm**3), DENSITIES_G_MM3
     ball = (np.abs(radius - half) <= POSE_MM) & (norm(b - c) <= POSE_MM)

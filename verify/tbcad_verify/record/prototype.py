@@ -57,7 +57,10 @@ Angle = Annotated[float, Field(ge=-360, le=360)]
 
 
 class Balls(Columns):
-    """One ball or cap a row, K of them, with the base at angle zero."""
+    """One ball or cap a row, K of them, with the base at angle zero.
+
+    Apices and centres are those under weight, bodies are where the seats have them without.
+    """
 
     most_rows: ClassVar[int] = MOST
 
@@ -82,6 +85,9 @@ class Balls(Columns):
     bx: Numbers
     by: Numbers
     bz: Numbers
+    sag_x_mm: Numbers
+    sag_y_mm: Numbers
+    sag_z_mm: Numbers
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -93,6 +99,11 @@ class Balls(Columns):
     def cap(self) -> Bools:
         """(K,) true for caps."""
         return np.asarray(self.kind == "cap")
+
+    @property
+    def sag(self) -> Floats:
+        """(3, K) displacements of the balls by weight, on the mean over their pictures, mm."""
+        return self.columns("sag_x_mm", 3)
 
     def names(self, which: NDArray[np.integer]) -> list[str]:
         """What reports call them."""

@@ -6,7 +6,7 @@ ball in the place of one of camera b's mirrors. Both runs differ only in where t
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -27,7 +27,7 @@ from tbcad.light.simulate.scene.reflector import (
     SubstitutedReflector,
 )
 from tbcad.records.prototype import NAME, Prototype
-from tbcad.records.tables import BallRow, PictureRow
+from tbcad.records.tables import SAG, BallRow, PictureRow
 from tbcad.types import Floats, Ints
 
 # Of lengths in mm after rounding in a text file.
@@ -42,6 +42,8 @@ HALF_TURN = np.array([-1.0, -1.0, 1.0])
 @dataclass(frozen=True)
 class Plan:
     """Balls on the base at angle zero, and how they stand in for m mirrors of each camera.
+
+    Balls are where weight is to bring them, on the mean over their pictures.
 
     The first row of `ball` and `stop` is for camera a's mirrors, the second for camera b's: they
     are photographed in a second run by the same camera, with the object turned by 180 degrees.
@@ -62,6 +64,9 @@ class Plan:
     parted: bool = False
     # radius of the part of a cap in use, mm, (k,); 0 of balls. None: there are no caps
     half_aperture: Floats | None = None
+    # mean displacement of the balls by weight, by which their seats are made beside their places,
+    # mm, (k, 3), or zero
+    sag: Floats = field(default_factory=lambda: np.zeros(3))
 
     def __len__(self) -> int:
         return len(self.radius)
@@ -92,13 +97,14 @@ def read_plan(exported: ExportedDesign) -> Plan:
         apex=columns(balls, APEX),
         normal=columns(balls, NORMAL),
         radius=columns(balls, "radius_mm")[:, 0],
-        body_centre=columns(balls, "bx by bz"),
+        body_centre=columns(balls, "bx by bz") + columns(balls, SAG),
         body_radius=columns(balls, "body_radius_mm")[:, 0],
         moved=document.picture == "moved",
         angle=np.radians(_angles(plan_file, pictures)),
         ball=ball.astype(np.int64),
         stop=stop.astype(np.int64),
         half_aperture=_half_apertures(record, document, len(balls)),
+        sag=columns(balls, SAG),
     )
     _check_errors(plan_file, error_deg, plan, exported)
     return plan
