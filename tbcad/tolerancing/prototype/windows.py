@@ -79,8 +79,8 @@ def draw_prototypes(
 ) -> PrototypeDraws:
     """Errors of some prototypes; see tbcad.tolerancing.montecarlo.draws.draw_kinds.
 
-        Purchased balls have the errors of their grade, caps (k,) those of a mirror that is a part of
-        its own (`Errors.whole_radius`), each with its centre unchanged, and those of a cap's form.
+    Purchased balls have the errors of their grade, caps (k,) those of a mirror that is a part of
+    its own (`Errors.whole_radius`), each with its centre unchanged, and those of a cap's form.
     Gravity is that at the t stops of one run.
     """
     k, t = len(is_cap), len(gravity.wind_up)
