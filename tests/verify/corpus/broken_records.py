@@ -191,6 +191,8 @@ RECORDS: tuple[Mutation, ...] = (
     ),
     *failing(
         JSON,
+        ("an LED 5 mm aside", at("lamps/places/0/position_mm/1", plus(5)), "lamp ring", "LED 1"),
+        ("LEDs of camera a dark", at("lamps/places", lambda all_: all_[6:]), "light ratio"),
         ("cameras 0.1 mm lower", lower(*PINHOLES), "requirements", "pinhole"),
         ("cameras and spec 0.1 mm lower", lower(*PINHOLES, "spec/optics/camera_mm"), "poses"),
         ("camera b 0.1 mm aside", at(f"{PINHOLES[1]}/1", plus(0.1)), "requirements", "b pinhole 1"),
