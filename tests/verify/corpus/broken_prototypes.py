@@ -429,6 +429,13 @@ FAILING: Broken = {
     ("ball sizes", BALLS): {"a cap of steel": (row(BALLS, 0, mass_g=9.0), "ball 1")},
     ("drive", BALLS): {"a heavy ball on the motor": (HEAVY, "the drive holds")},
     ("hold ratio", BALLS): {"a heavy ball on its magnet": (HEAVY, "ball")},
+    ("ball contrast", BALLS): {"a rough ball": (row(BALLS, -1, grade="G40"), "ball 5")},
+    ("fall energy", RECORD): {
+        "no brake that is known": (record("bought/4/part", "BRAKE-17-0.1"), "with BRAKE-17-0.1")
+    },
+    ("board outputs", PROGRAM): {
+        "a board of no outputs": (record("controller/board", "UNO-CNC-SHIELD"), "of UNO-CNC-SHIELD")
+    },
     ("power off", BALLS): {
         "a heavy ball on the zero pin": (row(BALLS, -1, mass_g=1e6), "zero pin's pressure")
     },

@@ -30,6 +30,7 @@ PROTOTYPE_SETTINGS = (
     "camera.height_px=310",
     "mesh.structure_error_mm=0.03",
     "prototype.largest_ball_mm=60",
+    f'prototype.catalogues=["{Path(__file__).parent / "large_balls.csv"}"]',
 )
 
 
