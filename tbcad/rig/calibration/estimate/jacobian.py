@@ -20,7 +20,13 @@ from scipy.sparse import csr_array
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import LensCamera, distorted
 from tbcad.core.optics.reflection import reflection_points
-from tbcad.core.optics.sphere_forms import bends, effective_centres, heights, term_heights
+from tbcad.core.optics.sphere_forms import (
+    TERM_COUNT,
+    bends,
+    effective_centres,
+    heights,
+    term_heights,
+)
 from tbcad.rig.calibration.estimate.parameters import (
     Block,
     Of,
@@ -212,15 +218,19 @@ def _seen(
     )
     if machine.forms is None:
         return reflections(centre, radius, light, pinhole), {}
-    form = machine.forms_in(frame, sphere)
-    touching = effective_centres(centre, radius, form, light, pinhole)
-    offset = reflection_points(touching, radius, light, pinhole) - centre
-    seen = reflections(touching, radius, light, pinhole, bends(form, offset))
+    some, touching = machine.forms.half_aperture[sphere] > 0, centre.copy()
+    form, bend = machine.forms_in(frame[some], sphere[some]), np.zeros((len(centre), 3, 3))
+    size, own = radius[some], light[some]
+    touching[some] = effective_centres(centre[some], size, form, own, pinhole)
+    offset = reflection_points(touching[some], size, own, pinhole) - centre[some]
+    bend[some] = bends(form, offset)
+    seen = reflections(touching, radius, light, pinhole, bend)
     # A larger radius takes a direction from the centre farther across the form.
-    outward = unit(offset)[..., None]
-    farther = heights(form, offset)[1][:, None] @ outward * (seen.by_centre @ outward)
-    farther = farther + seen.by_slope @ bends(form, offset) @ outward
-    seen = replace(seen, by_radius=seen.by_radius + farther[..., 0])
+    outward, by_radius = unit(offset)[..., None], seen.by_radius.copy()
+    along = seen.by_centre[some] @ outward
+    farther = heights(form, offset)[1][:, None] @ outward * along
+    by_radius[some] += (farther + seen.by_slope[some] @ bend[some] @ outward)[..., 0]
     height, gradient = term_heights(form, offset)
-    by_height = (seen.by_centre @ outward) * height[:, None]
-    return seen, {Block.FORM: by_height + seen.by_slope @ gradient.swapaxes(1, 2)}
+    by_form = np.zeros((len(centre), 3, TERM_COUNT))
+    by_form[some] = along * height[:, None] + seen.by_slope[some] @ gradient.swapaxes(1, 2)
+    return replace(seen, by_radius=by_radius), {Block.FORM: by_form}
