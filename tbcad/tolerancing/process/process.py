@@ -167,7 +167,7 @@ def process_errors(
     """
     kinds = {key: value for key, value in process if isinstance(value, ErrorSpec)}
     made = {} if caps == "none" else cap_forms(caps)
-    kinds |= {key: one for key, one in made.items() if key not in process.model_fields_set}
+    kinds |= {key: one for key, one in made.items() if kinds[key] == AS_CAPS}
     coating = kinds["coating_um"]
     kinds["coating_um"] = coating.model_copy(update={"mean": coating.mean - known_coating_um})
     errors = {key.rpartition("_")[0]: kind.error for key, kind in kinds.items()}

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tbcad.core.optics.sphere_forms import FORM_TERMS
 from tbcad.core.spec.errors import SpecError, section_of
 from tbcad.core.spec.errors import dotted_fields as keys_of
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
@@ -16,8 +17,10 @@ from tbcad.tolerancing.process.chain import STEPS_FILE
 from tbcad.tolerancing.process.process import (
     BUILT_IN,
     BY_USER,
+    CAPS_FILE,
     Process,
     ball_radius_error,
+    cap_forms,
     load_process,
     process_errors,
 )
@@ -46,12 +49,16 @@ def refused(file: Path, text: str | bytes) -> str:
     return said.removeprefix(f"{file}: ")
 
 
+CAPS = ("cap_sagitta", *(f"cap_{name}" for name in FORM_TERMS))
+
+
 def table(magnitude: float, mean: float, without: str = "", **others: str) -> str:
     """A file whose kinds have the same figures, whole but for one kind."""
     head = 'name = "even"\ntitle = "All the same"\nschema = 1\nball_grade = "G3"\n'
     body = f'magnitude = {magnitude}\nmean = {mean}\nsource = "tests"\n'
     form = f'magnitude = {magnitude}\nsource = "tests"\n'
-    forms = dict.fromkeys(("waviness_um", "cutter_radius_mm", "ridge_rounding_um"), form)
+    caps = (f"{one}_um" for one in CAPS)
+    forms = dict.fromkeys(("waviness_um", "cutter_radius_mm", "ridge_rounding_um", *caps), form)
     bodies = {"warp_um": f"{form}length_mm = 50\n"} | forms | others
     kinds = (kind for kind in KINDS if kind != without)
     return head + "".join(f"[{kind}]\n{bodies.get(kind, body)}" for kind in kinds)
@@ -61,7 +68,9 @@ class TestBuiltIn:
     def test_are_all_files_there_are(self) -> None:
         there = files("tbcad.tolerancing").joinpath("process").iterdir()
         assert sorted(f"{name}.toml" for name in BUILT_IN) == sorted(
-            file.name for file in there if file.name.endswith(".toml") and file.name != STEPS_FILE
+            file.name
+            for file in there
+            if file.name.endswith(".toml") and file.name not in {STEPS_FILE, CAPS_FILE}
         )
 
     @pytest.mark.parametrize(
@@ -151,7 +160,21 @@ class TestErrors:
             "sag": Error(0.02, 0.01),
         }
         for name, error in vars(got).items():
+            known |= {name: Error(0.002)} if name in CAPS else {}
             assert name in others or error == known.get(name, Error(0.002, 0.001)), name
+
+    def test_forms_of_caps_are_by_how_they_are_made_unless_stated(self) -> None:
+        printed, turned, none = (
+            process_errors(load_process("fdm"), caps=caps) for caps in ("printed", "turned", "none")
+        )
+        assert printed.cap_sagitta == Error(0.01)
+        assert turned.cap_sagitta == Error(pytest.approx(0.0003))
+        assert none.cap_sagitta == Error()
+        assert (
+            set(cap_forms("printed")) == set(cap_forms("turned")) == {f"{one}_um" for one in CAPS}
+        )
+        own = process_errors(load_process("fdm", ["cap_coma_um=5"]), caps="turned")
+        assert (own.cap_coma, own.cap_sagitta) == (Error(0.005), turned.cap_sagitta)
 
     def test_of_the_coat_only_what_the_design_does_not_know(self) -> None:
         process = load_process("fdm", ["coating_um.mean=40", "coating_um=15"])

@@ -20,7 +20,13 @@ from scipy.sparse import csr_array
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import LensCamera, distorted
 from tbcad.core.optics.reflection import reflection_points
-from tbcad.core.optics.sphere_forms import bends, effective_centres, heights, term_heights
+from tbcad.core.optics.sphere_forms import (
+    TERM_COUNT,
+    bends,
+    effective_centres,
+    heights,
+    term_heights,
+)
 from tbcad.rig.calibration.estimate.parameters import (
     Block,
     Of,
@@ -28,6 +34,7 @@ from tbcad.rig.calibration.estimate.parameters import (
     Slopes,
     left_jacobian,
     sphere_slopes,
+    turn_slopes,
 )
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Floats, Ints
@@ -176,7 +183,7 @@ def light_images(
 ) -> LightImages:
     """Where spheres (n,) show lights (n, 3) in frames (n,) of the machine of these values."""
     camera = machine.camera
-    seen, formed = _seen(machine, frame, sphere, light)
+    seen, formed, by_turn = _seen(machine, frame, sphere, light)
     image = (seen.point - camera.pinhole) @ camera.axes.T
     pixel, by_image, by_lens = projection(camera, image)
     by_point = by_image @ camera.axes
@@ -195,6 +202,9 @@ def light_images(
         **{block: by_point @ seen.by_centre @ value for block, value in moved.by.items()},
         **{block: by_point @ value for block, value in formed.items()},
     }
+    if by_turn is not None:
+        for block, turn in turn_slopes(prior, values, machine, frame).items():
+            by[block] = by[block] + by_point @ by_turn @ turn
     if Block.POWER in by:
         growth = prior.radius_by_power(values)[sphere, None, None]
         by[Block.POWER] = by[Block.POWER] + growth * by[Block.RADII]
@@ -203,24 +213,38 @@ def light_images(
 
 def _seen(
     machine: Machine, frame: Ints, sphere: Ints, light: Floats
-) -> tuple[Reflections, dict[Block, Floats]]:
-    """Points where spheres show lights, and their derivatives by what only caps have, (n, 3, c)."""
+) -> tuple[Reflections, dict[Block, Floats], Floats | None]:
+    """Points where spheres show lights, and their derivatives by what only caps have, (n, 3, c).
+
+    And by rotations of the forms alone about their spheres' centres, (n, 3, 3); None: no forms.
+    """
     centre, radius, pinhole = (
         machine.centres(frame, sphere),
         machine.radius[sphere],
         machine.camera.pinhole,
     )
     if machine.forms is None:
-        return reflections(centre, radius, light, pinhole), {}
-    form = machine.forms_in(frame, sphere)
-    touching = effective_centres(centre, radius, form, light, pinhole)
-    offset = reflection_points(touching, radius, light, pinhole) - centre
-    seen = reflections(touching, radius, light, pinhole, bends(form, offset))
+        return reflections(centre, radius, light, pinhole), {}, None
+    some, touching = machine.forms.half_aperture[sphere] > 0, centre.copy()
+    form, bend = machine.forms_in(frame[some], sphere[some]), np.zeros((len(centre), 3, 3))
+    size, own = radius[some], light[some]
+    touching[some] = effective_centres(centre[some], size, form, own, pinhole)
+    offset = reflection_points(touching[some], size, own, pinhole) - centre[some]
+    bend[some] = bends(form, offset)
+    seen = reflections(touching, radius, light, pinhole, bend)
     # A larger radius takes a direction from the centre farther across the form.
-    outward = unit(offset)[..., None]
-    farther = heights(form, offset)[1][:, None] @ outward * (seen.by_centre @ outward)
-    farther = farther + seen.by_slope @ bends(form, offset) @ outward
-    seen = replace(seen, by_radius=seen.by_radius + farther[..., 0])
+    outward, by_radius = unit(offset)[..., None], seen.by_radius.copy()
+    along = seen.by_centre[some] @ outward
+    farther = heights(form, offset)[1][:, None] @ outward * along
+    by_radius[some] = (along + farther + seen.by_slope[some] @ bend[some] @ outward)[..., 0]
     height, gradient = term_heights(form, offset)
-    by_height = (seen.by_centre @ outward) * height[:, None]
-    return seen, {Block.FORM: by_height + seen.by_slope @ gradient.swapaxes(1, 2)}
+    by_form = np.zeros((len(centre), 3, TERM_COUNT))
+    by_form[some] = along * height[:, None] + seen.by_slope[some] @ gradient.swapaxes(1, 2)
+    # At a fixed offset o a rotation w changes the height by -grad . (w x o), and the gradient g by
+    # w x g - H (w x o).
+    slope, by_turn = heights(form, offset)[1], np.zeros((len(centre), 3, 3))
+    lever = np.cross(offset[:, None], np.eye(3)).swapaxes(1, 2)  # columns o x e
+    swung = np.cross(slope[:, None], np.eye(3)).swapaxes(1, 2)
+    by_turn[some] = along @ (slope[:, None] @ lever)
+    by_turn[some] += seen.by_slope[some] @ (bend[some] @ lever - swung)
+    return replace(seen, by_radius=by_radius), {Block.FORM: by_form}, by_turn

@@ -277,6 +277,20 @@ def sphere_slopes(
     )
 
 
+def turn_slopes(prior: Prior, values: Floats, machine: Machine, frame: Ints) -> dict[Block, Floats]:
+    """Small rotations of the base in frames, (n, 3, c), by what turns it: forms turn with it."""
+    turn = np.zeros((len(frame), 3)) if machine.turn is None else machine.turn[frame]
+    wobble = Rotation.from_rotvec(turn).as_matrix()
+    tilts = left_jacobian(prior.tilt(values).as_rotvec()) @ prior.across.T
+    about = wobble @ machine.axis[:, None]
+    return {
+        Block.TILT: wobble @ tilts,
+        Block.OFFSET: about,
+        Block.ANGLES: about,
+        Block.TURN: left_jacobian(turn) @ prior.across.T,
+    }
+
+
 def base_slopes(prior: Prior, values: Floats) -> Slopes:
     """Derivatives of spheres' centres at base angle zero and radii, (k, 4), by what moves them."""
     machine = prior.machine(values)

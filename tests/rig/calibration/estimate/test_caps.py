@@ -65,7 +65,9 @@ def test_a_power_moves_no_apex_and_is_the_sagitta(prior: Prior) -> None:
     assert grown == pytest.approx(prior.sigma[Block.POWER][caps])
 
 
-@pytest.mark.parametrize("block", [Block.POWER, Block.FORM, Block.CENTRES, Block.RADII])
+@pytest.mark.parametrize(
+    "block", [Block.POWER, Block.FORM, Block.CENTRES, Block.RADII, Block.TILT, Block.TURN]
+)
 def test_slopes_are_those_of_finite_differences(prior: Prior, block: Block) -> None:
     values, machine = drawn(prior, 3)
     seen = every_highlight(machine, 1)
@@ -77,7 +79,8 @@ def test_slopes_are_those_of_finite_differences(prior: Prior, block: Block) -> N
         ends = [prior.machine(values + sign * step).highlights(*places) for sign in (-1, 1)]
         slope = (ends[1] - ends[0]).ravel() / (2 * STEP)
         found = slopes[:, [k]].toarray().ravel()
-        assert found == pytest.approx(slope, abs=0.02 * np.abs(slope).max())
+        # A tilt that forms did not follow would tell of the axis what nothing tells.
+        assert found == pytest.approx(slope, abs=1e-3 * np.abs(slope).max())
 
 
 def test_errors_are_as_large_as_the_covariance_says(prior: Prior) -> None:
