@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from embreex import rtcore_scene
-from embreex.mesh_construction import TriangleMesh
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
@@ -33,27 +31,17 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.print_bed import fitting_orientation, min_bed, size_text
-from tbcad.types import Bools, Floats
+from tbcad.types import Floats
 
 LEVEL = 1e-6  # of a normal's downward part
 STEEP = np.sin(np.radians(45))  # of it, from which on a printer needs support
 EXACT = 1e3  # weight of the sum of shares, which is one
 NO_PADS = np.zeros((0, 3))
-MAX_OVERHANG = np.cos(np.radians(45))  # of the downward part of a facet's normal
+MAX_OVERHANG = np.cos(np.radians(40))  # of the downward part of a facet's normal: see slicing
 # Base and caps turn, stage and frame are static; a tool is not in the assembly.
 Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
 VOLUME_ERROR = 1e-4
-LAYER_MM = 0.2
-SIDE_MM, FLAT_MM = 1.65, 1.0  # what is solid behind a wall, and below or above a flat face
-SUPPORT = 0.29  # share of the space below an overhang
-# mm^3 in a second, of walls, solid layers, infill and support; seconds more for each layer.
-FLOWS = (5.5, 1.5, 3.1, 2.2)
-LAYER_S = 6.2
-OVERHANG = np.cos(np.radians(40))  # of the downward part of a facet's normal, from which on
-FLAT = 0.5  # of the vertical part of a normal, from which on a facet counts as flat
 TOUCHING_MM = 0.05  # a facet no higher lies on the bed
-BELOW_MM = 0.02  # where rays begin, off the facet they are for
-HOUR_S = 3600.0
 
 
 def downward_pads(normals: Floats, orientation: Floats) -> tuple[int, int]:
@@ -146,7 +134,7 @@ def placed_on_bed(
             f"{name} does not fit on the printer's bed: make printer.bed_mm at least {bed}, or "
             "prototype.largest_ball_mm or prototype.k smaller"
         )
-    best = min(fitting, key=lambda way: (*downward_pads(pads, way), round(_overhang(mesh, way), 3)))
+    best = min(fitting, key=lambda way: (*downward_pads(pads, way), round(_support_room(mesh, way))))
     placed = corners @ best
     low, high = placed.min(axis=0), placed.max(axis=0)
     origin = -np.array([*(low + high)[:2] / 2, low[2]])
@@ -155,14 +143,14 @@ def placed_on_bed(
     return PlacedSolid(name, solid, in_place, properties.rotated(axes), axes.T @ best, origin)
 
 
-def _overhang(mesh: Mesh, orientation: Floats) -> float:
-    """Area that hangs over by more than 45 degrees and does not lie on the bed, mm^2."""
+def _support_room(mesh: Mesh, orientation: Floats) -> float:
+    """Volume between the bed and what needs support above it, mm^3."""
     corner = (mesh.vertices @ orientation)[mesh.triangles]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    area = norm(normal) / 2
-    height = corner[..., 2].max(axis=1) - corner[..., 2].min()
-    overhangs = (-normal[:, 2] > MAX_OVERHANG * 2 * area) & (height > TOUCHING_MM)
-    return float(area[overhangs].sum())
+    height = corner[..., 2] - corner[..., 2].min()
+    overhangs = -normal[:, 2] > MAX_OVERHANG * norm(normal)
+    overhangs &= height.max(axis=1) > TOUCHING_MM
+    return float((-normal[:, 2] / 2 * height.mean(axis=1))[overhangs].sum())
 
 
 @dataclass(frozen=True)
@@ -232,43 +220,3 @@ def _outward(body: Prism) -> Floats:
     """The corners in the order that turns the prism's faces outward."""
     a, b = body.corners[1] - body.corners[0], body.corners[2] - body.corners[0]
     return body.corners if np.cross(a, b) @ body.along > 0 else body.corners[::-1]
-
-
-def print_estimate(mesh: Mesh, infill: float) -> tuple[float, float]:
-    """Filament (mm^3), supports included, and hours, to print a mesh that stands on the bed.
-
-    The print is by a 0.4 mm nozzle in layers of 0.2 mm: four perimeters, five layers at top and
-    bottom, a share of infill, support below 40 degrees. Thicknesses and flows were fitted at 25 %
-    of infill on what PrusaSlicer 2.5 says of 29 printed parts of two designs, with its default
-    speeds; docs/prototype.md has the errors.
-    """
-    corners = mesh.vertices[mesh.triangles]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    area = np.maximum(norm(across), np.finfo(float).tiny)
-    up = across[:, 2] / area
-    sides = (area * np.sqrt(np.maximum(1 - up**2, 0))).sum()
-    flats = (area * np.abs(up))[np.abs(up) > FLAT].sum()
-    solid = np.array([SIDE_MM * sides, FLAT_MM * flats])
-    solid *= min(1.0, mesh.volume / solid.sum())
-    inside = infill * (mesh.volume - solid.sum())
-    heights = corners[..., 2]
-    bottom = heights.min()
-    over = (up < -OVERHANG) & (heights.max(axis=1) > bottom + TOUCHING_MM)
-    columns = _room_below(corners, over, bottom)
-    volumes = np.array([*solid, inside, SUPPORT * float((-across[over, 2]) @ columns)])
-    layers = (heights.max() - bottom) / LAYER_MM
-    seconds = (volumes / FLOWS).sum() + layers * LAYER_S
-    return float(volumes.sum()), float(seconds / HOUR_S)
-
-
-def _room_below(corners: Floats, which: Bools, bottom: float) -> Floats:
-    """Heights of what is free below the middles of some facets, down to the part or the bed, mm."""
-    middles = corners[which].mean(axis=1) - [0.0, 0.0, BELOW_MM]
-    if not len(middles):
-        return np.zeros(0)
-    scene = rtcore_scene.EmbreeScene()
-    TriangleMesh(scene, corners.astype(np.float32))
-    down = np.zeros_like(middles, dtype=np.float32)
-    down[:, 2] = -1
-    hit = scene.run(middles.astype(np.float32), down, query="DISTANCE")
-    return np.asarray(np.minimum(hit.astype(float), middles[:, 2] - bottom))
