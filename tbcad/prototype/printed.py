@@ -27,6 +27,7 @@ from tbcad.cad.kernel.solids import (
     to_bytes,
 )
 from tbcad.core.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved, Slot
+from tbcad.core.geometry.rotations import unit_circle
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
@@ -36,6 +37,7 @@ from tbcad.types import Floats
 LEVEL = 1e-6  # of a normal's downward part
 STEEP = np.sin(np.radians(45))  # of it, from which on a printer needs support
 EXACT = 1e3  # weight of the sum of shares, which is one
+POSES = 4000  # directions that are tried where a part does not fit as its pads would have it
 NO_PADS = np.zeros((0, 3))
 MAX_OVERHANG = np.cos(np.radians(40))  # of the downward part of a facet's normal: see slicing
 # Base and caps turn, stage and frame are static; a tool is not in the assembly.
@@ -68,6 +70,19 @@ def opening_up(normals: Floats) -> Floats | None:
     if length < LEVEL or float((normals @ up).min()) < LEVEL * length:
         return None
     return np.asarray(-up / length)
+
+
+def leaning_poses(normals: Floats) -> Floats:
+    """Directions that may point down, (d, 3): the higher the lowest pad then faces, the earlier.
+
+    Of directions spread evenly over the sphere by a spiral, those in which no pad of the unit
+    normals (n, 3) faces down by more than 45 degrees: such a pad needs no support.
+    """
+    share, turn = (np.arange(POSES) + 0.5) / POSES, np.pi * (1 + np.sqrt(5)) * np.arange(POSES)
+    up = 1 - 2 * share
+    downs = np.column_stack([np.sqrt(1 - up**2)[:, None] * unit_circle(turn), up])
+    lowest = (normals @ -downs.T).min(axis=0)
+    return downs[np.argsort(-lowest, kind="stable")[: int((lowest >= -STEEP).sum())]]
 
 
 @dataclass(frozen=True)
@@ -127,6 +142,9 @@ def placed_on_bed(
     opening = opening_up(pads)
     directions = [*downs, *([] if opening is None else [opening])]
     orientations = [fitting_orientation(corners, down, printer) for down in directions]
+    if len(pads) and orientations[-1] is None:  # the bed is too small for the cups to open upward
+        leaning = (fitting_orientation(corners, down, printer) for down in leaning_poses(pads))
+        orientations.append(next((one for one in leaning if one is not None), None))
     fitting = [orientation for orientation in orientations if orientation is not None]
     if not fitting:
         bed = size_text(min_bed(corners, downs, printer))
@@ -134,7 +152,9 @@ def placed_on_bed(
             f"{name} does not fit on the printer's bed: make printer.bed_mm at least {bed}, or "
             "prototype.largest_ball_mm or prototype.k smaller"
         )
-    best = min(fitting, key=lambda way: (*downward_pads(pads, way), round(_support_room(mesh, way))))
+    best = min(
+        fitting, key=lambda way: (*downward_pads(pads, way), round(_support_room(mesh, way)))
+    )
     placed = corners @ best
     low, high = placed.min(axis=0), placed.max(axis=0)
     origin = -np.array([*(low + high)[:2] / 2, low[2]])
