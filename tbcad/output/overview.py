@@ -22,9 +22,9 @@ from tbcad.shell.files import camera_a_mesh, design_mandrel
 from tbcad.types import Progress
 
 # Hours of printing for a cubic centimetre of solid volume, and filament, supports included, as a
-# share of it: the mean of 14 parts of the paper's prototype by PrusaSlicer 2.5 with the settings of
-# the parts list's estimates (tbcad.prototype.printed).
-HOURS_PER_CM3, FILLED = 0.087, 0.84
+# share of it: what PrusaSlicer 2.5 says of the paper's prototype with the settings of the parts
+# list's estimates (tbcad.prototype.slicing), by the nozzle's diameter.
+HOURS_PER_CM3, FILLED = {0.4: 0.080, 0.6: 0.043}, 0.84
 COARSE = MeshSpec(ray_error_mm=10.0, chord_error_mm=1.0, structure_error_mm=0.5)
 MM3_PER_CM3 = 1000.0
 
@@ -147,4 +147,5 @@ def _print_estimate(volume_mm3: float, spec: Spec) -> PrintEstimate:
     mass = volume_cm3 * FILLED * spec.printer.density_g_cm3
     price = load_prices(spec.prototype.prices).of(PRINT_MATERIAL, mass)
     money = {price.currency: price.amount} if price else {}
-    return PrintEstimate(volume_cm3, mass, volume_cm3 * HOURS_PER_CM3, money)
+    hours = volume_cm3 * HOURS_PER_CM3[spec.printer.nozzle_mm]
+    return PrintEstimate(volume_cm3, mass, hours, money)

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from embreex import rtcore_scene
-from embreex.mesh_construction import TriangleMesh
 from manifold3d import Manifold
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.optimize import nnls
@@ -35,31 +33,23 @@ from tbcad.cad.kernel.solids import (
     to_bytes,
 )
 from tbcad.core.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved, Slot
+from tbcad.core.geometry.rotations import unit_circle
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.print_bed import fitting_orientation, min_bed, size_text
-from tbcad.types import Bools, Floats
+from tbcad.types import Floats
 
 LEVEL = 1e-6  # of a normal's downward part
 STEEP = np.sin(np.radians(45))  # of it, from which on a printer needs support
 EXACT = 1e3  # weight of the sum of shares, which is one
+POSES = 4000  # directions that are tried where a part does not fit as its pads would have it
 NO_PADS = np.zeros((0, 3))
-MAX_OVERHANG = np.cos(np.radians(45))  # of the downward part of a facet's normal
+MAX_OVERHANG = np.cos(np.radians(40))  # of the downward part of a facet's normal: see slicing
 # Base and caps turn, stage and frame are static; a tool is not in the assembly.
 Role: TypeAlias = Literal["base", "cap", "stage", "frame", "tool"]
 VOLUME_ERROR = 1e-4
-LAYER_MM = 0.2
-SIDE_MM, FLAT_MM = 1.65, 1.0  # what is solid behind a wall, and below or above a flat face
-SUPPORT = 0.29  # share of the space below an overhang
-# mm^3 in a second, of walls, solid layers, infill and support; seconds more for each layer.
-FLOWS = (5.5, 1.5, 3.1, 2.2)
-LAYER_S = 6.2
-OVERHANG = np.cos(np.radians(40))  # of the downward part of a facet's normal, from which on
-FLAT = 0.5  # of the vertical part of a normal, from which on a facet counts as flat
 TOUCHING_MM = 0.05  # a facet no higher lies on the bed
-BELOW_MM = 0.02  # where rays begin, off the facet they are for
-HOUR_S = 3600.0
 
 
 def downward_pads(normals: Floats, orientation: Floats) -> tuple[int, int]:
@@ -86,6 +76,19 @@ def opening_up(normals: Floats) -> Floats | None:
     if length < LEVEL or float((normals @ up).min()) < LEVEL * length:
         return None
     return np.asarray(-up / length)
+
+
+def leaning_poses(normals: Floats) -> Floats:
+    """Directions that may point down, (d, 3): the higher the lowest pad then faces, the earlier.
+
+    Of directions spread evenly over the sphere by a spiral, those in which no pad of the unit
+    normals (n, 3) faces down by more than 45 degrees: such a pad needs no support.
+    """
+    share, turn = (np.arange(POSES) + 0.5) / POSES, np.pi * (1 + np.sqrt(5)) * np.arange(POSES)
+    up = 1 - 2 * share
+    downs = np.column_stack([np.sqrt(1 - up**2)[:, None] * unit_circle(turn), up])
+    lowest = (normals @ -downs.T).min(axis=0)
+    return downs[np.argsort(-lowest, kind="stable")[: int((lowest >= -STEEP).sum())]]
 
 
 @dataclass(frozen=True)
@@ -145,6 +148,9 @@ def placed_on_bed(
     opening = opening_up(pads)
     directions = [*downs, *([] if opening is None else [opening])]
     orientations = [fitting_orientation(corners, down, printer) for down in directions]
+    if len(pads) and orientations[-1] is None:  # the bed is too small for the cups to open upward
+        leaning = (fitting_orientation(corners, down, printer) for down in leaning_poses(pads))
+        orientations.append(next((one for one in leaning if one is not None), None))
     fitting = [orientation for orientation in orientations if orientation is not None]
     if not fitting:
         bed = size_text(min_bed(corners, downs, printer))
@@ -152,7 +158,9 @@ def placed_on_bed(
             f"{name} does not fit on the printer's bed: make printer.bed_mm at least {bed}, or "
             "prototype.largest_ball_mm or prototype.k smaller"
         )
-    best = min(fitting, key=lambda way: (*downward_pads(pads, way), round(_overhang(mesh, way), 3)))
+    best = min(
+        fitting, key=lambda way: (*downward_pads(pads, way), round(_support_room(mesh, way)))
+    )
     placed = corners @ best
     low, high = placed.min(axis=0), placed.max(axis=0)
     origin = -np.array([*(low + high)[:2] / 2, low[2]])
@@ -161,14 +169,14 @@ def placed_on_bed(
     return PlacedSolid(name, solid, in_place, properties.rotated(axes), axes.T @ best, origin)
 
 
-def _overhang(mesh: Mesh, orientation: Floats) -> float:
-    """Area that hangs over by more than 45 degrees and does not lie on the bed, mm^2."""
+def _support_room(mesh: Mesh, orientation: Floats) -> float:
+    """Volume between the bed and what needs support above it, mm^3."""
     corner = (mesh.vertices @ orientation)[mesh.triangles]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    area = norm(normal) / 2
-    height = corner[..., 2].max(axis=1) - corner[..., 2].min()
-    overhangs = (-normal[:, 2] > MAX_OVERHANG * 2 * area) & (height > TOUCHING_MM)
-    return float(area[overhangs].sum())
+    height = corner[..., 2] - corner[..., 2].min()
+    overhangs = -normal[:, 2] > MAX_OVERHANG * norm(normal)
+    overhangs &= height.max(axis=1) > TOUCHING_MM
+    return float((-normal[:, 2] / 2 * height.mean(axis=1))[overhangs].sum())
 
 
 @dataclass(frozen=True)
@@ -246,43 +254,3 @@ def _outward(body: Prism) -> Floats:
     """The corners in the order that turns the prism's faces outward."""
     a, b = body.corners[1] - body.corners[0], body.corners[2] - body.corners[0]
     return body.corners if np.cross(a, b) @ body.along > 0 else body.corners[::-1]
-
-
-def print_estimate(mesh: Mesh, infill: float) -> tuple[float, float]:
-    """Filament (mm^3), supports included, and hours, to print a mesh that stands on the bed.
-
-    The print is by a 0.4 mm nozzle in layers of 0.2 mm: four perimeters, five layers at top and
-    bottom, a share of infill, support below 40 degrees. Thicknesses and flows were fitted at 25 %
-    of infill on what PrusaSlicer 2.5 says of 29 printed parts of two designs, with its default
-    speeds; docs/prototype.md has the errors.
-    """
-    corners = mesh.vertices[mesh.triangles]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    area = np.maximum(norm(across), np.finfo(float).tiny)
-    up = across[:, 2] / area
-    sides = (area * np.sqrt(np.maximum(1 - up**2, 0))).sum()
-    flats = (area * np.abs(up))[np.abs(up) > FLAT].sum()
-    solid = np.array([SIDE_MM * sides, FLAT_MM * flats])
-    solid *= min(1.0, mesh.volume / solid.sum())
-    inside = infill * (mesh.volume - solid.sum())
-    heights = corners[..., 2]
-    bottom = heights.min()
-    over = (up < -OVERHANG) & (heights.max(axis=1) > bottom + TOUCHING_MM)
-    columns = _room_below(corners, over, bottom)
-    volumes = np.array([*solid, inside, SUPPORT * float((-across[over, 2]) @ columns)])
-    layers = (heights.max() - bottom) / LAYER_MM
-    seconds = (volumes / FLOWS).sum() + layers * LAYER_S
-    return float(volumes.sum()), float(seconds / HOUR_S)
-
-
-def _room_below(corners: Floats, which: Bools, bottom: float) -> Floats:
-    """Heights of what is free below the middles of some facets, down to the part or the bed, mm."""
-    middles = corners[which].mean(axis=1) - [0.0, 0.0, BELOW_MM]
-    if not len(middles):
-        return np.zeros(0)
-    scene = rtcore_scene.EmbreeScene()
-    TriangleMesh(scene, corners.astype(np.float32))
-    down = np.zeros_like(middles, dtype=np.float32)
-    down[:, 2] = -1
-    hit = scene.run(middles.astype(np.float32), down, query="DISTANCE")
-    return np.asarray(np.minimum(hit.astype(float), middles[:, 2] - bottom))

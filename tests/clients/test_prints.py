@@ -1,4 +1,4 @@
-"""PrusaSlicer on printed parts: its supports stay off the pads, coupons take an afternoon."""
+"""PrusaSlicer on printed parts: supports off the pads, an afternoon of coupons, estimates."""
 
 from __future__ import annotations
 
@@ -12,14 +12,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 import tbcad
 from tbcad.cad.formats.mesh_files import write_stl
+from tbcad.cad.kernel.mesh import Mesh
 from tbcad.core.mirrors.array import design
+from tbcad.prototype import slicing
 from tbcad.prototype.arrangement import arrange
 from tbcad.prototype.base.coupon import coupon_plates
 from tbcad.prototype.base.coupon_seats import expected_downs, worst_pose
 from tbcad.prototype.printed import PrintedPart, part_mesh
+from tbcad.prototype.slicing import print_estimate
 
 pytestmark = [
     *(pytest.mark.clients, pytest.mark.slow),
@@ -45,6 +49,7 @@ COUPON = (
     *("--perimeters", "4", "--top-solid-layers", "5", "--bottom-solid-layers", "5"),
     *("--fill-density", "25%", "--fill-pattern", "gyroid"),
 )
+BED = "--bed-shape", "0x0,400x0,400x400,0x400"
 NEAR_MM = (0.0, 1.0)  # in front of a pad
 BESIDE_MM = 0.3  # its edge
 STEP_MM = 0.5
@@ -90,6 +95,17 @@ def test_supports_on_the_build_plate_touch_no_pad(prototype_build: Path) -> None
             assert not (near & (beside < seat["pad_diameter_mm"] / 2 + BESIDE_MM)).any()
 
 
+def print_of(code: str) -> tuple[float, float]:
+    """Filament, mm^3, and hours of a print by PrusaSlicer."""
+    length = re.search(r"filament used \[mm\] = ([\d.]+)", code)
+    printed = re.search(r"estimated printing time \(normal mode\) = (.*)", code)
+    assert length is not None
+    assert printed is not None
+    spans = re.findall(r"(\d+)([dhms])", printed[1])
+    hours = sum(int(count) * HOURS[unit] for count, unit in spans)
+    return float(length[1]) * math.pi / 4 * FILAMENT_MM**2, hours
+
+
 def test_the_coupons_take_an_afternoon(tmp_path: Path) -> None:
     arranged = arrange(design(tbcad.load_spec(None)))
     base, split, printer = arranged.base, arranged.split, arranged.spec.printer
@@ -98,13 +114,21 @@ def test_the_coupons_take_an_afternoon(tmp_path: Path) -> None:
     for plate in coupon_plates(base, printer, pose, 0.02):
         file = tmp_path / f"{plate.name}.stl"
         write_stl(file, part_mesh(PrintedPart(plate, "tool", "coupon")))
-        text = sliced(file, *COUPON)
-        length = re.search(r"filament used \[mm\] = ([\d.]+)", text)
-        printed = re.search(r"estimated printing time \(normal mode\) = (.*)", text)
-        assert length is not None
-        assert printed is not None
-        filament += float(length[1]) * math.pi / 4 * FILAMENT_MM**2
-        spans = re.findall(r"(\d+)([dhms])", printed[1])
-        hours += sum(int(count) * HOURS[unit] for count, unit in spans)
+        volume, duration = print_of(sliced(file, *COUPON))
+        filament, hours = filament + volume, hours + duration
     assert 1.0 < hours <= LIMIT_H
     assert 0 < filament <= FILAMENT_MM3
+
+
+@pytest.mark.parametrize("nozzle", [0.4, 0.6])
+@pytest.mark.parametrize("name", ["camera_plate", "home_bracket", "bearing_head", "stage_crown"])
+def test_estimates_are_within_15_percent(prototype_build: Path, name: str, nozzle: float) -> None:
+    file = prototype_build / f"{name}.stl"
+    settings = Path(slicing.__file__).parent / "slicer" / f"nozzle_{nozzle:g}.ini"
+    code = file.with_name(f"{name}_{nozzle:g}.gcode")
+    words = ["prusa-slicer", "--datadir", file.parent / "home", "-g", "--load", settings, *BED]
+    subprocess.run([*words, "--output", code, file], check=True, capture_output=True)
+    whole = trimesh.load_mesh(file)
+    mesh = Mesh(np.asarray(whole.vertices, dtype=float), np.asarray(whole.faces))
+    estimated = print_estimate(mesh, 0.25, nozzle)
+    assert estimated == pytest.approx(print_of(code.read_text(encoding="utf-8")), rel=0.15)

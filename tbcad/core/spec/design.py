@@ -42,7 +42,16 @@ class PrinterSpec(Section):
     """Young's modulus of the printed material where it is solid (PETG 2.0, PLA 3.0, PA12 1.7), for
     how far the base sags under its weight."""
     infill: float = Field(0.25, ge=0.05, le=1)
-    """Share of material inside the four perimeters."""
+    """Share of material inside the walls."""
+    nozzle_mm: float = 0.6
+    """Diameter of the nozzle, 0.4 or 0.6: 0.6 prints layers of 0.3 mm and takes 60 % of the hours;
+    for the estimates of filament and time."""
+
+    @model_validator(mode="after")
+    def _nozzle_has_settings(self) -> Self:
+        if self.nozzle_mm not in (0.4, 0.6):
+            raise ValueError(f"nozzle_mm is {self.nozzle_mm:g}, but estimates know 0.4 and 0.6")
+        return self
 
 
 class CameraSpec(Section):

@@ -40,9 +40,10 @@ from tbcad.prototype.frame.stock import Stock
 from tbcad.prototype.gravity.sag import write_sag
 from tbcad.prototype.light.shroud import pattern
 from tbcad.prototype.model import build_prototype_model
-from tbcad.prototype.printed import PrintedPart, Role, component_solid, part_mesh, print_estimate
+from tbcad.prototype.printed import PrintedPart, Role, component_solid, part_mesh
 from tbcad.prototype.purchased.parts import Prices, load_prices
 from tbcad.prototype.registry import PARTS
+from tbcad.prototype.slicing import print_estimate
 from tbcad.records.prototype import NAME
 from tbcad.records.tables import WiringRow
 from tbcad.types import Progress
@@ -118,7 +119,7 @@ def write_part(folder: Path, part: PrintedPart, spec: Spec) -> tuple[float, floa
     write_step(folder / f"{part.name}.step", solid, spec.step.pcurves, part.solid.properties)
     write_stl(folder / f"{part.name}.stl", mesh)
     write_3mf(folder / f"{part.name}.3mf", part.name, mesh)
-    return print_estimate(mesh, spec.printer.infill)
+    return print_estimate(mesh, spec.printer.infill, spec.printer.nozzle_mm)
 
 
 def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: Prices) -> list[Row]:

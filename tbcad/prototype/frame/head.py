@@ -108,7 +108,7 @@ def bearing_head(site: Site, _: FrameLayout) -> BearingHead:
         "head with bearings and motor",
         tuple(added),
         tuple(removed),
-        (w, -w, axes[0], -axes[0], axes[1]),
+        (w, -w),  # bores of bearings upright, which are round then
     )
     return BearingHead(
         printed=(component,),
