@@ -1,5 +1,6 @@
 """What all else is mounted to: base plate, uprights, and the brackets that they stand in."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -53,6 +54,7 @@ PLATE, UPRIGHT = "drawing_plate", "drawing_upright"
 TABLE_MM = (10.0, 18.0, 18.0, 14.0, 42.0)  # widths of the columns of the hole table
 TABLE_HEAD = ("hole", "x", "y", "thread", "holds")
 DATUM_MM, OFF_MM = 8.0, 4.0  # length of the arrows at the origin, and of lines beyond the part
+SIDE_OR_NUMBER = re.compile(r"_(left|right|\d+)(?=_|$)")  # in names of bodies that are alike
 LAMP_NOTES = {
     0: (),
     1: ("Left end on the plate. Marked: the screw of the lamps' holder, in the front slot.",),
@@ -161,7 +163,9 @@ def shop_step(machine: AssembledMachine) -> Words:
     """Plate and uprights as drawn; what must be matt black is blackened before it is mounted."""
     stock = machine.record.frame_stock
     plate, upright = map(machine.record.drawing_of, (stock.plate, stock.upright))
-    black = ", ".join(one.name.replace("_", " ") for one in machine.record.bought if one.finish)
+    finished = (one.name for one in machine.record.bought if one.finish)
+    kinds = dict.fromkeys(SIDE_OR_NUMBER.sub("", name).replace("_", " ") for name in finished)
+    black = ", ".join(kinds)
     return told_words(
         __name__,
         "shop",

@@ -20,7 +20,7 @@ from tbcad.records.tables import BallRow, WiringRow
 from tests.prototype_records import drive_section, printed_part, prototype_document
 
 Record = dict[str, Any]
-PRINTED = ("carrier", "zero_disc", "bearing_head", "stage_foot", "coupon_1")
+PRINTED = ("carrier", "zero_disc", "bearing_head", "camera_bracket", "coupon_1")
 AXIS = [0.0, 0.0, 1.0]
 
 
@@ -43,13 +43,14 @@ def belt_design() -> Record:
             *(bought("wheel", "GT2-60"), bought("pinion", "GT2-20")),
             bought("spacer", "SPACER-8x12x5"),
             *(bought("motor", "NEMA17-40"), bought("camera", None)),
+            *(bought("stage_post", "TUBE-20x2x250"), bought("stage_foot", "SHF-20")),
         ],
         fasteners=[
             fastener("INSERT-M3", 1, "carrier", at=20.0),
             fastener("SET-M3x12", 1, "carrier"),
             fastener("M3x16", 1, "wheel", "zero_disc", "carrier"),
-            fastener("M5x16", 1, "stage_foot", "plate", x=50.0, at=1.0),
-            fastener("WASHER-5", 1, "stage_foot", x=50.0),
+            fastener("M5x16", 1, "camera_bracket", "plate", x=50.0, at=1.0),
+            fastener("WASHER-5", 1, "camera_bracket", x=50.0),
             fastener("M3x12", 1, "bearing_head", "motor"),
         ],
         drive=drive_section(

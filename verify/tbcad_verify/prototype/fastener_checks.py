@@ -241,7 +241,7 @@ def _hole_faults(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> 
     some += [one.name for one in prototype.bought if str(one.part).startswith(BRACKETS)]
     diameters = dict.fromkeys(some, printed) | {"plate": {*IN_PLATE_MM}}
     for name in diameters.keys() & solids.keys():  # another check says what is missing
-        through = [one for one in prototype.fasteners if name in one.through]
+        through = [one for one in prototype.fasteners if name in one.through and not _covers(one)]
         faces = [
             face
             for face in solids[name].faces
@@ -257,6 +257,12 @@ def _hole_faults(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> 
         ]
         if empty:
             yield f"{name}: {len(empty)} of {2 * empty[0].radius:g} mm without a fastener"
+
+
+def _covers(one: PlacedFastener) -> bool:
+    """Whether a fastener lies on a hole and is not in it."""
+    size = size_of(one.part)
+    return size is not None and size.covers
 
 
 def is_filled(one: PlacedFastener, face: RoundFace, faces: list[RoundFace]) -> bool:
