@@ -48,7 +48,8 @@ def instructions(machine: AssembledMachine) -> Instructions:
     """The instructions for a prototype. InputError: as `assembly_steps`."""
     words, steps = _words(), assembly_steps(machine)
     kinds = {machine.kind(part) for part in machine.bill.items}
-    each = ", ".join(f"{what} {value:g}" for what, value in words["minutes"].items())
+    done = {what for step in steps for what in _done(machine, step)}
+    each = ", ".join(f"{what} {one:g}" for what, one in words["minutes"].items() if what in done)
     hours = totals(machine.bill.rows)["print_hours"]
     return Instructions(
         about=tuple(words["about"]),
@@ -74,6 +75,11 @@ def designation(row: Row) -> str:
 def work_minutes(machine: AssembledMachine, step: Step) -> float:
     """Minutes of one person for a step: each instruction, check, part and hole."""
     each = _words()["minutes"]
+    return float(sum(each[what] * count for what, count in _done(machine, step).items()))
+
+
+def _done(machine: AssembledMachine, step: Step) -> Counter[str]:
+    """How often each kind of work is done in a step."""
     counts = Counter({"instructions": len(step.does), "checks": len(step.checks)})
     for use in step.parts:
         counts[_work(machine, use)] += use.quantity
@@ -84,7 +90,7 @@ def work_minutes(machine: AssembledMachine, step: Step) -> float:
             )
     if step.key == "wiring":
         counts["lines of wiring"] += len(machine.wiring)
-    return float(sum(each[what] * count for what, count in counts.items()))
+    return counts
 
 
 def hours_text(minutes: float) -> str:
