@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-NOT_MODELLED = "lens 2 mm, shadows, caps"
+NOT_MODELLED = "lens 2 mm, shadows"
 """By no simulated build; the figure is of the paper's design: docs/tolerance.md has them all."""
 MOST, NEAREST = 3, 2  # processes that can, and that cannot, of which the verdict tells
 GOOD = 0.95  # share of few builds that stands for a process that can make a design
