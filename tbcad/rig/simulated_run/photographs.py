@@ -12,7 +12,7 @@ from tbcad.common.compiled import compiled
 from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
 from tbcad.light.simulate.capture.photograph import row_bands
 from tbcad.light.simulate.prototype.ball_rays import ball_hits, camera_colours
-from tbcad.light.simulate.prototype.run import HALF_TURN
+from tbcad.light.simulate.prototype.run import HALF_TURN, turned_balls
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.records.run import DARK, DARK_LIT, LIT, Frame, PhaseTimes
 from tbcad.rig.machine.designed import BuiltPrototype
@@ -158,13 +158,13 @@ def object_light(
 ) -> Colours:
     """What a camera sees of a lit object, 0 to 255, (h, w, 3).
 
-    Its pixels have directions (h, w, 3); balls are (k, 8) in the frame. The scene is the object as
-    it stands in the first run; it may be turned by 180 degrees.
+    Its pixels have directions (h, w, 3); balls are (k, 8) in the frame, or with forms behind these
+    columns. The scene is the object as it stands in the first run; it may be turned by 180 degrees.
     """
     # Seen from the object, which rests, camera and balls are turned instead.
     flip = HALF_TURN if turned else np.ones(3)
     pinhole, walls = pinhole * flip, walls.flipped(flip)
-    balls = balls * np.concatenate([flip, [1.0], flip, [1.0]])
+    balls = turned_balls(balls, flip)
     bands = (directions[rows.start : rows.stop] * flip for rows in row_bands(len(directions)))
     return np.concatenate([_band(pinhole, balls, walls, scene, band) for band in bands])
 

@@ -252,6 +252,13 @@ def prototype_runs(
     return a, b
 
 
+def turned_balls(balls: Floats, factors: Floats) -> Floats:
+    """Balls with or without forms in a frame whose axes are turned by factors (3,) of +-1."""
+    spheres = balls[..., :SPHERES] * np.concatenate([factors, [1.0], factors, [1.0]])
+    forms = [turned_axes(balls[..., SPHERES:], factors)] if balls.shape[-1] > SPHERES else []
+    return np.concatenate([spheres, *forms], axis=-1)
+
+
 def prototype_run(
     reflector: Reflector, plan: Plan, half: int, camera: LensCamera, balls: Floats
 ) -> PrototypeRun:
@@ -260,13 +267,7 @@ def prototype_run(
     `half` is 0 for camera a's mirrors, 1 for camera b's, the object turned.
     """
     flip = HALF_TURN if half else np.ones(3)
-    balls = np.concatenate(
-        [
-            balls[..., :SPHERES] * np.concatenate([flip, [1.0], flip, [1.0]]),
-            *([turned_axes(balls[..., SPHERES:], flip)] if balls.shape[-1] > SPHERES else []),
-        ],
-        axis=-1,
-    )
+    balls = turned_balls(balls, flip)
     camera = replace(camera, pinhole=camera.pinhole * flip, axes=camera.axes * flip)
     ball, stop = plan.ball[half], plan.stop[half]
     centre, radius = balls[stop, ball, :3], balls[stop, ball, 3]
