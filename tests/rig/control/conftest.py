@@ -49,7 +49,12 @@ def export(
     for name, text in controller_files(layout, drive, motion, LEDS, "a design").items():
         (folder / name).write_text(text)
     lit = [{"name": one.name, "output": one.output} for one in phases(LEDS, motion)]
-    controller = {"firmware": motion.controller, "axis": motion.axis, "phases": lit}
+    controller = {
+        "firmware": motion.controller,
+        "board": "UNO-CNC-SHIELD",
+        "axis": motion.axis,
+        "phases": lit,
+    }
     edit_json(folder / "prototype.json", lambda value: value.update(controller=controller))
     quick = json.loads(motion.model_dump_json()) | {"light_s": 0.0}
     edit_json(folder / "design.json", lambda value: value["spec"]["prototype"].update(motion=quick))
