@@ -105,7 +105,7 @@ def test_a_command_takes_paths_and_its_own_options() -> None:
 
 
 def test_public_functions_have_the_options_of_their_commands() -> None:
-    names = "build calibrate capture export intrinsics merge reconstruct run simulate_run verify"
+    names = "build calibrate capture dataset intrinsics merge reconstruct run simulate_run verify"
     for name in names.split():
         command = {one.name for one in leaves()[(name.replace("_", "-"),)].params}
         python = set(inspect.signature(getattr(tbcad, name)).parameters)

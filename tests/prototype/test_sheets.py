@@ -23,7 +23,8 @@ from tests.sheet_texts import check_texts, covered
 
 LISTED = load_parts()
 BILL = PartsList(
-    tuple({"item": 41, "quantity": 1, "part": part} for part in LISTED), "turtleback, n = 18"
+    tuple({"item": 41, "quantity": 1, "part": part, "from": "bought"} for part in LISTED),
+    "turtleback, n = 18",
 )
 
 

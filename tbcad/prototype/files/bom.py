@@ -29,7 +29,7 @@ COLUMNS = (
 )
 WHOLE = ("item", "quantity", "print_volume_mm3")
 NUMBERS = (*WHOLE, "mass_g", "total_mass_g", "filament_g", "print_hours", *PRICE_COLUMNS[:2])
-ALWAYS = {"DRIVER-TMC5160": 1, "FUSE-2A": 1, "GLUE-EPOXY": 1, "SUPPLY-24V": 1}
+ALWAYS = {"DRIVER-2A": 1, "FUSE-2A": 1, "GLUE-EPOXY": 1, "SUPPLY-24V": 1}
 # Magnetic and hardened, so that magnets hold it and it polishes; AISI 52100. 316 is not magnetic.
 BALL_STEEL = "100Cr6"
 PRINT_MATERIAL = "PETG"

@@ -87,7 +87,7 @@ class TestBalls:
             balls = choose_balls(candidates, limits, catalogue)
             return balls, ball_fit(candidates, balls)
 
-        balls, _ = fitted(caps=False)
+        balls, _ = fitted(caps="none")
         assert balls.radius.max() == 30
         assert not balls.cap.any()
         balls, fit = fitted(snap="nearest")

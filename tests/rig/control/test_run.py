@@ -97,7 +97,7 @@ def test_operator_is_asked(
     rig: Rig, monkeypatch: pytest.MonkeyPatch, cli: Callable[..., Any]
 ) -> None:
     words = [word for word in rig.words("--phases", "dark", stops="1") if word != "--yes"]
-    assert "say --yes" in cli(*words, code=2).err
+    assert "use --yes" in cli(*words, code=2).err
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
     asked: list[str] = []
 

@@ -35,7 +35,7 @@ def compared(folder: Path, camera: str = "a") -> FrontComparison:
     export = read_export(folder)
     (part,) = (part for part in export.parts if part.camera == camera)
     with Processes(1) as processes:
-        (file,) = read_step_files(replace(export, parts=(part,)), processes).values()
+        file = read_step_files(replace(export, parts=(part,)), processes)[part.name]
     return compare(export, part, file)
 
 
