@@ -16,7 +16,7 @@ pytestmark = pytest.mark.corpus
 
 FIELDS = Path(__file__).parents[3] / "docs" / "fields.md"
 KINDS = {"measured", "worked out", "spec", "form", "hash"}
-TOTALS = {f"totals.{name}_price" for name in ("bought", "work", "filament")}
+TOTALS = {f"totals.{name}_price" for name in ("bought", "tools", "filament")}
 MAPS = {"files", "versions", *TOTALS}  # keys are data
 
 

@@ -301,7 +301,8 @@ def _check_parts(design: Design, prototype: Prototype | None) -> None:
     others = [*design.mandrels, *(prototype.parts if prototype else [])]
     others += [design.lamps.ring] if design.lamps else []
     meshes = [part.stl for part in (*design.parts, *others)]
-    if not meshes or len(set(meshes)) != len(meshes):
+    lit = not design.lamps or design.parts  # lamps are of shells
+    if not meshes or not lit or len(set(meshes)) != len(meshes):
         raise BadExport(f"{DESIGN}: parts must be there, each with an STL of its own; {AGAIN}")
     twice = {part.name for part in design.parts} & {part.name for part in others}
     if orphans := {one.camera for one in design.mandrels} - {one.camera for one in design.parts}:
