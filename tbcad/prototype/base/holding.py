@@ -175,10 +175,9 @@ def magnet_pockets(
     diameter = _largest(spec, room)
     height = np.full_like(diameter, spec.magnet_height_mm)
     weak = _pull(spec, prototype, diameter, height) < MIN_RATIO * needed
-    weak &= ~prototype.balls.cap  # a cap has a magnet too, and no weight
     height[weak] = max(spec.magnet_height_mm, spec.strong_magnet_height_mm)
     pull = _pull(spec, prototype, diameter, height)
-    weak &= pull < MIN_RATIO * needed
+    weak &= (pull < MIN_RATIO * needed) & ~prototype.balls.cap  # a cap has a magnet too
     if weak.any():
         ball = first_ball(weak)
         raise SpecError(
