@@ -30,6 +30,9 @@ from tbcad.prototype.purchased.parts import Parts, PurchasedPart
 from tbcad.types import Floats
 
 LED, SET_SCREW, INSERT = "STAR-3535", "SET-M3x8", "INSERT-M3"
+UNEVEN = 4.0  # brightest over darkest surface, at most
+# Of smaller machines more than 0.5 % of the pixels may see an LED past the object.
+LEAST_CAPTURE_MM = 40.0
 NUMBER = 6  # of LEDs, if nothing else is asked for: one string of them on 24 V
 SUPPLY_V = 24.0
 BORE_MM, FRONT_MM = 60.0, 10.0  # where no camera is known
@@ -171,7 +174,9 @@ def facing(step_deg: float) -> Floats:
 
 
 def lamp_ring(design: MirrorDesign, parts: Parts) -> LampRing | None:
-    """The ring of LEDs for a shell's cameras; None without, also where "auto" finds no room.
+    """The ring of LEDs for a shell's cameras; None without.
+
+    Also where "auto" finds no room, or where rings would light unevenly or dazzle.
 
     SpecError: there is no room for what is asked for; it says what to change.
     """
@@ -182,11 +187,20 @@ def lamp_ring(design: MirrorDesign, parts: Parts) -> LampRing | None:
     bore, front = _lens(design, array)
     resistor = series_resistor(parts[LED], parts[LED]["rated_ma"], SUPPLY_V, parts, number)
     ring = LampRing(parts[LED], number, bore, front, resistor)
-    if fault := _fault(ring, design):
-        if section.leds == AUTO:
-            return None
+    fault = _fault(ring, design)
+    if section.leds == AUTO:
+        return None if fault or not _lights_well(ring, design) else ring
+    if fault:
         raise SpecError(f"shell.lamps: {fault}: set shell.lamps.leds to auto, or to 0 for none")
     return ring
+
+
+def _lights_well(ring: LampRing, design: MirrorDesign) -> bool:
+    """Whether surfaces get like amounts of light, and LEDs are small beside the machine."""
+    if design.spec.optics.capture_diameter_mm < LEAST_CAPTURE_MM:
+        return False
+    least, _, greatest = ring.light(design).tolist()
+    return bool(greatest <= UNEVEN * least)
 
 
 def _lens(design: MirrorDesign, array: MirrorArray) -> tuple[float, float]:

@@ -140,7 +140,8 @@ class ShellLampsSpec(Section):
     """A ring of LEDs on each camera's lens: the mirrors throw their light onto the object."""
 
     leds: Annotated[int, OR_AUTO] = Field(AUTO, ge=0, le=8)
-    """LEDs on each ring; 0: no lamps; auto: 6, or 0 where the rings have no room."""
+    """LEDs on each ring; 0: no lamps; auto: 6, or 0 where rings have no room, would light unevenly,
+    or would dazzle: in capture spheres of less than 40 mm."""
     lens_mm: Annotated[float, OR_AUTO] = Field(AUTO, ge=20, le=200)
     """Diameter of the lens's barrel that a ring is clamped on; auto: that of the prototype's camera
     (prototype.frame.camera), or 60 where none is known."""
