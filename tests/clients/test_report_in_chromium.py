@@ -13,7 +13,12 @@ from tests.clients.browser import Browser
 pytestmark = [pytest.mark.clients, pytest.mark.slow]
 
 SMALL = ("--set", "camera.width_px=416", "--set", "camera.height_px=310")
-BALLS = ("--set", "prototype.largest_ball_mm=60")  # else all are caps
+BALLS = (
+    "--set",
+    "prototype.largest_ball_mm=60",
+    "--set",
+    "prototype.grade=G40",
+)  # else all are caps
 TEXT = "document.getElementById('{}').textContent"
 # Middle of an element in the window, which is moved so that it is in sight.
 MIDDLE = """(() => {{
@@ -42,7 +47,7 @@ MIRROR = """(() => {
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small design with both parts, a capture, and a report with it."""
     folder = tmp_path_factory.mktemp("report") / "exports"
-    assert run(["build", "--n", "6", *SMALL, *BALLS, "--out", str(folder), "--quiet"]) == 0
+    assert run(["build", "--n", "6", *SMALL, "--out", str(folder), "--quiet"]) == 0
     capture = folder.parent / "capture"
     assert run(["capture", str(folder), "--out", str(capture)]) == 0
     page = folder.parent / "with_capture.html"
@@ -124,7 +129,7 @@ def test_the_prototypes_ball_looks_as_its_mirror_does(page: Browser) -> None:
 def test_parts_are_switched_and_taken_apart(page: Browser) -> None:
     page.value("[...document.querySelectorAll('#presets button')].at(-2).click()")
     shown = "report.viewer.bodies.filter((one) => one.shown).map((one) => one.group)"
-    assert {"base", "balls", "frame"} <= set(page.value(shown))
+    assert {"base", "frame"} <= set(page.value(shown))
     page.value("document.getElementById('group_frame').click()")
     assert "frame" not in page.value(shown)
     page.value("report.fit()")
