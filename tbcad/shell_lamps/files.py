@@ -95,6 +95,6 @@ def ring_record(ring: LampRing, part: PrintedPart, design: MirrorDesign) -> Shel
         front_mm=ring.front,
         bore_mm=ring.bore,
         watt=RINGS * ring.watt,
-        lux=ring.light(design).tolist(),
+        lux=ring.lux,
         places=tuple(places),
     )

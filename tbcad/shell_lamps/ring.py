@@ -7,7 +7,7 @@ from x, which is along the rows of the camera's picture.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,6 +63,14 @@ class LampRing:
     bore: float  # diameter of the lens's barrel, mm
     front: float  # from the pinhole to the face, along the optical axis, mm
     resistor: SeriesResistor  # of the ring's string
+    # least, mean and greatest light of both rings on surfaces that face all ways, lux
+    lux: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def even(self) -> bool:
+        """Whether surfaces get like amounts of light."""
+        least, _, greatest = self.lux
+        return greatest <= UNEVEN * least
 
     @property
     def circle(self) -> float:
@@ -146,20 +154,6 @@ class LampRing:
         forward = np.repeat([camera.forward for camera in cameras], self.number, axis=0)
         return Lamps(places, forward, np.full(len(places), self.candela))
 
-    def light(self, design: MirrorDesign) -> Floats:
-        """Least, mean and greatest light (3,) on a sphere of two thirds of the capture sphere, lux.
-
-        On surfaces that face all ways; the object stands in its own light.
-        """
-        radius = OBJECT_OF_CAPTURE * design.spec.optics.capture_diameter_mm / 2
-        normals, lamps = facing(STEP_DEG), self.lamps(design)
-        total = direct_light(lamps, radius * normals, normals)
-        for array, side in zip(design.arrays, (1.0, -1.0), strict=True):
-            mirrors = lit_mirrors(array.mirrors, side, array.foot)
-            by_mirrors = light_by_mirrors(lamps, mirrors, radius * normals, normals, radius)
-            total = total + REFLECTED * by_mirrors
-        return np.array([total.min(), total.mean(), total.max()])
-
 
 def facing(step_deg: float) -> Floats:
     """Unit vectors (k, 3) of all directions, so many degrees apart or somewhat more."""
@@ -187,20 +181,29 @@ def lamp_ring(design: MirrorDesign, parts: Parts) -> LampRing | None:
     bore, front = _lens(design, array)
     resistor = series_resistor(parts[LED], parts[LED]["rated_ma"], SUPPLY_V, parts, number)
     ring = LampRing(parts[LED], number, bore, front, resistor)
+    auto = section.leds == AUTO
     fault = _fault(ring, design)
-    if section.leds == AUTO:
-        return None if fault or not _lights_well(ring, design) else ring
-    if fault:
+    if fault and not auto:
         raise SpecError(f"shell.lamps: {fault}: set shell.lamps.leds to auto, or to 0 for none")
-    return ring
+    if fault or (auto and design.spec.optics.capture_diameter_mm < LEAST_CAPTURE_MM):
+        return None
+    lit = replace(ring, lux=_light(ring, design))
+    return lit if lit.even or not auto else None
 
 
-def _lights_well(ring: LampRing, design: MirrorDesign) -> bool:
-    """Whether surfaces get like amounts of light, and LEDs are small beside the machine."""
-    if design.spec.optics.capture_diameter_mm < LEAST_CAPTURE_MM:
-        return False
-    least, _, greatest = ring.light(design).tolist()
-    return bool(greatest <= UNEVEN * least)
+def _light(ring: LampRing, design: MirrorDesign) -> tuple[float, float, float]:
+    """Least, mean and greatest light on a sphere of two thirds of the capture sphere, lux.
+
+    On surfaces that face all ways; the object stands in its own light.
+    """
+    radius = OBJECT_OF_CAPTURE * design.spec.optics.capture_diameter_mm / 2
+    normals, lamps = facing(STEP_DEG), ring.lamps(design)
+    total = direct_light(lamps, radius * normals, normals)
+    for array, side in zip(design.arrays, (1.0, -1.0), strict=True):
+        mirrors = lit_mirrors(array.mirrors, side, array.foot)
+        by_mirrors = light_by_mirrors(lamps, mirrors, radius * normals, normals, radius)
+        total = total + REFLECTED * by_mirrors
+    return float(total.min()), float(total.mean()), float(total.max())
 
 
 def _lens(design: MirrorDesign, array: MirrorArray) -> tuple[float, float]:

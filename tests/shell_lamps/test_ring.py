@@ -53,9 +53,9 @@ def test_the_camera_does_not_see_it(ring: LampRing, small_design: MirrorDesign) 
 
 
 def test_surfaces_that_face_all_ways_get_light_within_a_factor_of_four(
-    ring: LampRing, small_design: MirrorDesign
+    ring: LampRing,
 ) -> None:
-    low, mean, high = ring.light(small_design)
+    low, mean, high = ring.lux
     assert 3e3 < low < mean < high < 1.2e4
     assert high / low < 3
 
@@ -105,6 +105,18 @@ def test_none_where_none_is_asked_for_or_has_room(small_design: MirrorDesign) ->
     assert asked(small_design, lens_mm=200.0) is None
     flat = mirror_design("n=6", "mirrors.radius_rule=flat")
     assert lamp_ring(flat, PARTS) is None
+
+
+def test_auto_leaves_out_what_dazzles_or_lights_unevenly() -> None:
+    """Asked for by number they are there: LEDs are large beside a small machine."""
+    small = ("optics.camera_mm=[61.3, 0, -51.4]", "semi_minor_mm=82.6", "capture_diameter_mm=35")
+    low = ("optics.camera_mm=[135, 0, -85.4]", "semi_minor_mm=131.7", "capture_diameter_mm=52.6")
+    for optics in (small, low):
+        design = mirror_design("n=3", *optics)
+        assert lamp_ring(design, PARTS) is None
+        found = asked(design, leds=6)
+        assert found is not None
+        assert found.even == (optics is small)
 
 
 def test_a_candela_beside_each_lens_lights_the_upper_hemisphere(

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.camera import Camera, LensCamera, without_distortion
 from tbcad.core.optics.led_dome import dome_images
 from tbcad.core.optics.pedestals.cells import NO_WALLS
+from tbcad.core.optics.sphere_forms import TERM_COUNT, Forms
 from tbcad.light.simulate.prototype.ball_rays import balls_between
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
@@ -216,6 +217,24 @@ def test_a_photograph_does_not_depend_on_the_others(small: Small, export_folder:
     assert (whole["lit"] == some["lit"]).all()
     other = small.run.frame_photographs(number - 1, ("dark",))["dark"]
     assert (other != whole["dark"]).any()  # noise of its own
+
+
+def test_forms_are_seen_in_both_runs(small: Small) -> None:
+    """Fronts with a form of no height are spheres; one of some micrometres moves the picture."""
+    built = small.run.built
+    k, axes = len(built.body_radius), perpendicular_axes(unit(-built.machine.centre))
+
+    def lit(number: int, height: float) -> np.ndarray:
+        forms = Forms(np.full((k, TERM_COUNT), height), axes, np.full(k, 4.0))
+        formed = replace(built, machine=replace(built.machine, forms=forms))
+        run = replace(small.run, built=formed)
+        return np.asarray(run.frame_photographs(number, ("lit",))["lit"])
+
+    for turn in (0, 180):
+        number = [frame.object_turn_deg for frame in small.run.frames].index(turn)
+        spheres = small.run.frame_photographs(number, ("lit",))["lit"]
+        assert (lit(number, 0.0) == spheres).all()
+        assert (lit(number, 5e-3) != spheres).any()
 
 
 def test_light_ends_at_darkness_and_saturation(small: Small) -> None:

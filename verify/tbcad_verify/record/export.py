@@ -10,10 +10,10 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from tbcad_verify.errors import BadExport
 from tbcad_verify.record.files import (
@@ -49,6 +49,15 @@ MAX_SIDE_PX = 65536
 MAX_NAME = 64
 MAX_PIXELS = 500_000_000
 SQUARE = 1e-6  # by which axes of a camera may be off unit length or a right angle
+
+
+def _unit(vector: Floats) -> Floats:
+    if abs(float(vector @ vector) - 1) > SQUARE:
+        raise ValueError("is no unit vector")
+    return vector
+
+
+UnitVector = Annotated[Vector, AfterValidator(_unit)]
 
 
 class Camera(Strict):
@@ -98,16 +107,9 @@ class Part(PartFiles):
 class Mandrel(Part):
     """The negative of one camera's shell, and how the shell comes off."""
 
-    pull: Vector  # (3,) unit, along which the shell is drawn
+    pull: UnitVector  # (3,), along which the shell is drawn
     # least angle between pull and surface; below 0 it catches
     draft_deg: float = Field(ge=-90, le=90)
-
-    @field_validator("pull", mode="after")
-    @classmethod
-    def _unit(cls, pull: Floats) -> Floats:
-        if abs(float(pull @ pull) - 1) > SQUARE:
-            raise ValueError("is no unit vector")
-        return pull
 
 
 class ShellLamp(Strict):
@@ -115,14 +117,7 @@ class ShellLamp(Strict):
 
     camera: Name
     position: Vector = Field(alias="position_mm")
-    direction: Vector
-
-    @field_validator("direction", mode="after")
-    @classmethod
-    def _unit(cls, direction: Floats) -> Floats:
-        if abs(float(direction @ direction) - 1) > SQUARE:
-            raise ValueError("is no unit vector")
-        return direction
+    direction: UnitVector
 
 
 class ShellLamps(Strict):
