@@ -7,6 +7,7 @@ from tbcad.errors import InputError
 
 if TYPE_CHECKING:
     from build123d import Part
+    from pandas import DataFrame
 
 
 class Design(MirrorDesign):
@@ -41,6 +42,21 @@ class Design(MirrorDesign):
         cells = "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in rows.items())
         table = f"<table><caption>{self.spec.name}</caption>{cells}</table>"
         return f"<div>{table}{hemisphere_map(self.arrays)}</div>"
+
+    def to_dataframe(self) -> "DataFrame":
+        """Return a pandas table with a row for each mirror, indexed by id: columns of mirrors.csv.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        from tbcad.core.mirrors.record import mirror_rows
+
+        try:
+            from pandas import DataFrame
+        except ImportError as error:
+            raise InputError("a table needs pandas: pip install pandas") from error
+        rows = [row for array in self.arrays for row in mirror_rows(array)]
+        return DataFrame(rows).set_index("id")
 
     def shell(self, camera: Literal["a", "b"] = "a") -> "Part":
         """Return one camera's shell as a build123d part: mm, frame of the design, z up.

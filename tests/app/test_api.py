@@ -12,6 +12,7 @@ import pytest
 
 import tbcad
 from tbcad.errors import InputError
+from tbcad.records.tables import MirrorRow
 
 ROOT = Path(__file__).parents[2]
 HEAVY = {"numpy", "scipy", "OCP", "build123d", "cadquery", "h5py", "numba", "pydantic", "rich"}
@@ -44,6 +45,28 @@ def test_examples_in_docstrings(name: str) -> None:
     tried = doctest.testmod(module)
     assert tried.failed == 0
     assert tried.attempted > 0
+
+
+def test_mirrors_as_a_table() -> None:
+    """The columns of mirrors.csv, a row for each mirror of both cameras."""
+    small = tbcad.design(n=2)
+    table = small.to_dataframe()
+    assert list(table.index) == [*small.a.ids, *small.b.ids]
+    assert table.columns.to_list() == [name for name in MirrorRow.columns() if name != "id"]
+    assert (table.loc["a0003", ["px", "py", "pz"]] == small.a.mirrors.apex[2]).all()
+
+
+def test_a_table_without_pandas(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(InputError, match="pip install pandas"):
+        tbcad.design(n=2).to_dataframe()
+
+
+def test_short_reprs() -> None:
+    """No object that a notebook shows prints its arrays."""
+    small = tbcad.design(n=2)
+    shown = (small, small.a, small.a.mirrors, small.a.cells, small.spec)
+    assert all(len(repr(one)) < 120 for one in shown)
 
 
 @pytest.mark.slow

@@ -185,6 +185,16 @@ class MirrorDesign:
     spec: Spec  # that they follow from, with the angle of view that was chosen
     arrays: tuple[MirrorArray, MirrorArray]  # camera a's mirrors (x >= 0) and camera b's (x <= 0)
 
+    @property
+    def a(self) -> MirrorArray:
+        """Camera a's mirrors."""
+        return self.arrays[0]
+
+    @property
+    def b(self) -> MirrorArray:
+        """Camera b's mirrors."""
+        return self.arrays[1]
+
 
 def design(spec: Spec, progress: Progress = lambda _: None) -> MirrorDesign:
     """Directions, poses, radii and cells of all mirrors (section 3 of the paper); or SpecError."""

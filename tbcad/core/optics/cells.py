@@ -31,6 +31,9 @@ class Cells:
     triangles: Ints  # the three faces at each corner, counter-clockwise from outside, (t, 3)
     corners: Floats  # points, mm, (t, 3)
 
+    def __repr__(self) -> str:
+        return f"<Cells: {self.mirrors} mirrors, {len(self.corners)} corners>"
+
     @property
     def mirrors(self) -> int:
         """Number of mirrors m."""

@@ -27,6 +27,9 @@ class Surfaces:
     def __len__(self) -> int:
         return len(self.curvature)
 
+    def __repr__(self) -> str:
+        return f"<Surfaces: {len(self)}, {np.count_nonzero(self.curvature)} of them spherical>"
+
     @property
     def gradient_at_origin(self) -> Floats:
         """Gradient g of f(x) = (k/2) |x|^2 + g . x + h, (m, 3)."""
