@@ -268,6 +268,7 @@ def _rows(paper: Point) -> int:
 
 
 RESIN, RESIN_PROCESS, FILAMENT_PROCESS = "resin", "sla", "fdm"
+CAP = "cap"  # role of a part
 MAKERS_SHARE = 4.0  # standard deviations that a maker's tolerance is taken for: decision 0007
 BASE = "base"
 ON_AXIS = (BASE, "frame")  # roles of parts that shaft and bearings may go into
@@ -316,7 +317,9 @@ def draw_part(export: DrawnExport, part: PrintedPartRecord) -> list[Sheet]:
         quantity=int(row["quantity"] or 0),
         material=str(row["material"]),
     )
-    words = [*_notes(part, block.material, what), *export.source(part.step)]
+    turned = part.role == CAP and block.material != RESIN
+    block = block if turned else replace(block, tolerances=_as_printed(block.material))
+    words = [*_notes(part, turned, what), *export.source(part.step)]
     tables = (fasteners, [one for one in mates if one], [seats_table(shape, seats)])
     return part_sheets(part.name, shape, block, words, *tables)
 
@@ -365,14 +368,21 @@ def _spigots(record: Prototype, seats: Sequence[ListedSeat]) -> Iterator[Mate]:
             yield Mate(words, seat.centre, seat.axis, cap.spigot_mm, cap.socket_mm)
 
 
-def _notes(part: PrintedPartRecord, material: str, origin: str) -> Iterator[str]:
-    yield f"{part.what[:1].upper()}{part.what[1:]}."
-    yield f"Origin of x, y, z: {origin}."
+def _as_printed(material: str) -> str:
+    """What the printer holds: four standard deviations of a position (decision 0007)."""
     process = load_process(RESIN_PROCESS if material == RESIN else FILAMENT_PROCESS)
     expected = MAKERS_SHARE * process.sphere_centre_um.magnitude / 1000
-    yield f"Expected as printed ({process.name}): ±{mm(expected)} mm on short lengths."
+    return f"±{mm(expected)}, short lengths"
+
+
+def _notes(part: PrintedPartRecord, turned: bool, origin: str) -> Iterator[str]:
+    yield f"{part.what[:1].upper()}{part.what[1:]}."
+    yield f"Origin of x, y, z: {origin}."
+    if turned:
+        yield f"Turned: drawing_{part.name}.pdf (ISO 10110) has the mirror and its tolerances."
+        return
     finish = f"Finish: {part.finish}. " if part.finish else ""
-    yield f"{finish}Deburr; remove supports."
+    yield f"Printed. {finish}Deburr; remove supports."
 
 
 def part_datum(shape: Shape, point: Floats, directions: Mapping[str, Floats]) -> tuple[Floats, str]:
