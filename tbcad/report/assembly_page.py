@@ -44,31 +44,32 @@ def page(told: Instructions, pictures: Mapping[str, bytes]) -> str:
     words = tomllib.loads((files("tbcad.report") / WORDS).read_text(encoding="utf-8"))
     about = (*told.about, words["pictures"])
     body = (
-        "<h1>Assembly</h1>",
+        "<main><h1>Assembly</h1>",
         *(f"<p>{escape(text)}</p>" for text in about),
-        "<h3>Tools</h3>",
+        "<h2>Tools</h2>",
         _list(told.tools),
-        "<nav><h3>Steps</h3><ol>",
+        "<nav><h2>Steps</h2><ol>",
         *(f'<li><a href="#{step.key}">{escape(step.title)}</a></li>' for step in told.steps),
         "</ol></nav>",
         *_times(told),
-        "<h3>Tested</h3>",
+        "<h2>Tested</h2>",
         _table(("What", "Tested"), told.tested),
         *(line for step in told.steps for line in _step(step, told, pictures)),
         "<section><h2>Not drawn</h2><p>These parts of the list are no bodies of prototype.step, "
         "prototype.glb and the pictures.</p>",
         _list(told.not_drawn),
-        "</section>",
+        "</section></main>",
     )
     style = f"<style>\n{words['style']}</style>"
-    head = f'<meta charset="utf-8"><title>Assembly</title>{style}'
+    meta = '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+    head = f"{meta}<title>Assembly</title>{style}"
     return "\n".join(
         ("<!doctype html>", f'<html lang="en"><head>{head}</head><body>', *body, "</body></html>\n")
     )
 
 
 def _times(told: Instructions) -> Iterator[str]:
-    yield f"<h3>Time</h3><p>{hours_text(sum(told.minutes.values()))} of work in all.</p>"
+    yield f"<h2>Time</h2><p>{hours_text(sum(told.minutes.values()))} of work in all.</p>"
     yield from (f"<p>{escape(text)}</p>" for text in told.times)
 
 

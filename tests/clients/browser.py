@@ -73,7 +73,9 @@ class Browser:
         assert "exceptionDetails" not in result, result
         return result["result"].get("value")
 
-    def open(self, page: Path | str, width: int = 1400, height: int = 1100) -> float:
+    def open(
+        self, page: Path | str, width: int = 1400, height: int = 1100, ready: str = READY
+    ) -> float:
         """Open a file or address and wait until the page says that it is ready; return seconds."""
         self.call(
             "Emulation.setDeviceMetricsOverride",
@@ -84,7 +86,7 @@ class Browser:
         )
         started = time.monotonic()
         self.call("Page.navigate", url=page if isinstance(page, str) else page.resolve().as_uri())
-        while not self.value(READY):
+        while not self.value(ready):
             assert time.monotonic() - started < READY_S, self.faults
             time.sleep(0.05)
         return time.monotonic() - started

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import axe_core_python
 import numpy as np
 import pytest
 from PIL import Image
@@ -19,6 +20,13 @@ BALLS = (
     "--set",
     "prototype.grade=G40",
 )  # else all are caps
+AXE = Path(axe_core_python.__file__).parent / "axe.min.js"
+LOADED = "document.readyState === 'complete' && document.body?.children.length > 0"
+# What reaches beyond the window's right edge, but for drawings.
+CUT = """[...document.querySelectorAll("body *")].filter((one) => {
+  const box = one.getBoundingClientRect();
+  return box.width && box.right > innerWidth + 1 && !one.closest("svg, canvas");
+}).map((one) => one.outerHTML.slice(0, 80))"""
 TEXT = "document.getElementById('{}').textContent"
 # Middle of an element in the window, which is moved so that it is in sight.
 MIDDLE = """(() => {{
@@ -148,6 +156,20 @@ def test_dark_and_narrow(page: Browser, folder: Path) -> None:
     size = {"width": 360, "height": 740, "deviceScaleFactor": 1, "mobile": True}
     page.call("Emulation.setDeviceMetricsOverride", **size)
     assert page.value("document.documentElement.scrollWidth") <= 360
+
+
+@pytest.mark.parametrize("name", ["report.html", "assembly.html"])
+@pytest.mark.parametrize("width", [1280, 375])
+def test_pages_are_accessible(browser: Browser, folder: Path, name: str, width: int) -> None:
+    """By the rules of axe-core (WCAG 2.1 and good practice); nothing is cut at the right."""
+    if name == "assembly.html" and not (folder.parent / name).is_file():
+        assert run(["assembly", str(folder), "--out", str(folder.parent), "--no-pictures"]) == 0
+    page = folder / name if name == "report.html" else folder.parent / name
+    browser.open(page, width, 900, ready=LOADED)
+    browser.value(AXE.read_text(encoding="utf-8"))
+    faults = "one => one.id + ': ' + one.nodes.map((node) => node.html.slice(0, 80)).join(' ')"
+    assert browser.value(f"axe.run().then((found) => found.violations.map({faults}))") == []
+    assert browser.value(CUT) == []
 
 
 def test_print_has_the_view_as_a_picture(page: Browser) -> None:
