@@ -58,6 +58,7 @@ PURE: dict[str, tuple[str, ...]] = {
     "prototype.fastener_checks": ("_hole_spans",),
     "prototype.control.homing_checks": ("run_program",),
     "prototype.control.program_checks": ("run_klipper", "run_program"),
+    "prototype.sag_checks": ("_moved",),
     "prototype.seats": ("_facets_near", "_pad", "distance_to_facets"),
 }
 

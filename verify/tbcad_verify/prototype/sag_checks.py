@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tbcad_verify.mesh.mesh import join_meshes
+from tbcad_verify.mesh.mesh import Mesh, join_meshes
 from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.bodies import MeasuredPrototype, rigid_motions
 from tbcad_verify.prototype.bricks import STEP_MM, Bricks, fill_bricks, shapes
@@ -97,28 +97,41 @@ def _by_weight(
     printer, axis = context.export.spec.printer, context.frame[0]
     carrier = [one for one in of_roles(parts, "base") if one.part.name != ZERO_DISC]
     mesh = join_meshes([one.placed_mesh for one in carrier])
-    bricks = fill_bricks(mesh, printer.infill)
-    shaft = drawn[SHAFT][0]
+    seats = measured.seated.T, measured.body_radius, context.masses_g
+    moved = _moved(mesh, drawn[SHAFT][0], axis, seats, (printer.infill, printer.density_g_cm3))
+    return moved / (printer.modulus_gpa * 1e3)
+
+
+def _moved(
+    mesh: Mesh,
+    shaft: Floats,
+    axis: Floats,
+    seats: tuple[Floats, Floats, Floats],
+    material: tuple[float, float],
+) -> Floats:
+    """(K, 3, 3) at a modulus of 1 MPa, held on the shaft, whose corners are (n, 3).
+
+    seats: centres (K, 3), radii (K,) and masses (K,) of the balls; material: infill, density.
+    """
+    infill, density = material
+    bricks = fill_bricks(mesh, infill)
     along = bricks.place @ axis
     out = np.linalg.norm(bricks.place - along[..., None] * axis, axis=2)
     reach = np.linalg.norm(shaft - (shaft @ axis)[:, None] * axis, axis=1).max() + STEP_MM
     held = (bricks.share > 0) & (out < reach) & (along < (shaft @ axis).max() + STEP_MM)
-    weight = bricks.spread(bricks.share * STEP_MM**3 * printer.density_g_cm3 * 1e-3)
-    near = _near(bricks, measured)
-    for mass, one in zip(context.masses_g, near, strict=True):
+    weight = bricks.spread(bricks.share * STEP_MM**3 * density * 1e-3)
+    near = _near(bricks, *seats[:2])
+    for mass, one in zip(seats[2], near, strict=True):
         weight = weight + bricks.spread(one / one.sum()) * mass
-    load = weight[:, None, None] * G_MM * np.eye(3)
-    moved = bricks.solve(held, load) / (printer.modulus_gpa * 1e3)
-    centres = zip(measured.seated.T, near, strict=True)
-    return np.stack([_shift(bricks, moved, *pair) for pair in centres])
+    moved = bricks.solve(held, weight[:, None, None] * G_MM * np.eye(3))
+    return np.stack([_shift(bricks, moved, *pair) for pair in zip(seats[0], near, strict=True)])
 
 
-def _near(bricks: Bricks, measured: MeasuredPrototype) -> list[Floats]:
+def _near(bricks: Bricks, centres: Floats, radii: Floats) -> list[Floats]:
     """Material that carries each ball, K of (c, q)."""
-    spheres = zip(measured.seated.T, measured.body_radius, strict=True)
     return [
         bricks.share * (np.linalg.norm(bricks.place - centre, axis=2) < radius + STEP_MM)
-        for centre, radius in spheres
+        for centre, radius in zip(centres, radii, strict=True)
     ]
 
 
