@@ -49,7 +49,7 @@ RAY_FIGURES = ("sigma_mm", "sigma_mrad", "pixel_mm")
 
 @dataclass(frozen=True)
 class Deviations:
-    """Deviations of k balls from the designed base, moved as a whole to fit best."""
+    """Position errors of k balls from the designed base after rigid alignment."""
 
     offset: Floats  # of the centres, in the frame of the design, mm, (k, 3)
     radius: Floats  # measured less designed, mm, (k,)
@@ -123,7 +123,7 @@ def as_built(calibration: Path, exports: Path, folder: Path) -> dict[str, Any]:
     if len(machine.radius) != len(plan):
         raise InputError(
             f"{calibration} has {len(machine.radius)} balls, {exports} has {len(plan)}: name the "
-            "export that was calibrated with --exports"
+            "build that was calibrated with --exports"
         )
     found = deviations(machine, plan)
     write_assembly(folder / STEP, "prototype_as_built", [ball_group(machine, plan, found)])

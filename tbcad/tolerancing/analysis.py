@@ -56,7 +56,7 @@ class ProcessOption:
 
 @dataclass(frozen=True)
 class Analysis:
-    """What simulated builds say of a design: yield, causes, margins, sharpness of pictures."""
+    """Results of simulated builds: yield, causes, margins, sharpness of pictures."""
 
     process: Process
     options: ToleranceOptions

@@ -116,7 +116,7 @@ def _check_same_cameras(source: LightField, export: ExportedDesign) -> None:
             or not np.allclose(frame.mirrors.apex, reflector.mirrors.apex, atol=1e-6)
         ):
             raise InputError(
-                f"{export.folder} is not the export of this capture: its camera "
+                f"{export.folder} is not the build of this capture: its camera "
                 f"{reflector.camera_id} has other mirrors or pixels: name the one it was taken with"
             )
 

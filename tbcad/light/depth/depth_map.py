@@ -117,7 +117,7 @@ def depth_map(pictures: PinholePictures, view: Camera, sweep: Sweep = FINE) -> D
 
 @dataclass(frozen=True)
 class DepthViews:
-    """What views of a light field are made from, one after the other."""
+    """Source of views of a light field, one after the other."""
 
     tiles: MirrorTiles  # the light field
     pictures: PinholePictures  # of its virtual cameras

@@ -148,7 +148,7 @@ def density_of(number: Singles) -> Floats:
 
 
 def write_field(path: Path, made: Field) -> None:
-    """Write a field, replacing the file as a whole."""
+    """Write a field, replacing the file atomically."""
     replace_files(path.parent, {path.name: field_bytes(made)})
 
 

@@ -138,7 +138,7 @@ def _step(settings: Settings, state: State, progress: float, share: float, parts
 
 
 def _columns(settings: Settings, state: State, progress: float, share: float) -> ColumnSteps:
-    """What holds for the columns of the values."""
+    """Settings of the columns of the values."""
     final = state.level + 1 == len(settings.levels)
     slowing = 0.5 * (1 + cos(pi * progress)) if final else 1.0
     number, colour = (

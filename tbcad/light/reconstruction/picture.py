@@ -1,4 +1,4 @@
-"""What a camera would see of a field: colours, opacity, depth and normals."""
+"""Pictures of a field by a camera: colours, opacity, depth and normals."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -132,7 +132,7 @@ def write_preview(file: Path, made: Field) -> None:
 
 
 def quick_views(source: LightField) -> Callable[[Camera], Bytes]:
-    """What makes the picture (h, w, 3) of a camera from a coarse field, fitted to all rays.
+    """Function that makes a camera's picture (h, w, 3) from a coarse field, fitted to all rays.
 
     InputError: none of them meets the capture sphere.
     """

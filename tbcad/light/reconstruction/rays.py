@@ -189,7 +189,7 @@ def with_weights(rays: CapturedRays, source: LightField) -> CapturedRays:
 
 
 def pixel_areas(rays: CapturedRays) -> Singles:
-    """What each pixel sees square to its ray, in the middle of its way, mm^2, (n,)."""
+    """Area that each pixel sees square to its ray, in the middle of its way, mm^2, (n,)."""
     middle = (rays.length / 2)[:, None, None]
     steps = rays.footprint[:, :2] + middle * rays.footprint[:, 2:]
     across = np.cross(steps[:, 0], steps[:, 1])

@@ -223,7 +223,7 @@ def settings_of(record: dict[str, Any], places: Singles) -> Settings:
 
 
 def write_checkpoint(file: Path, kept: Checkpoint) -> None:
-    """Write a checkpoint, replacing the file as a whole: a field with the moments of Adam."""
+    """Write a checkpoint, replacing the file atomically: a field with the moments of Adam."""
     state = kept.state
     record = {
         "asked": kept.asked,

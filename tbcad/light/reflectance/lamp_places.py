@@ -118,7 +118,7 @@ class MirrorPixels:
 
 
 def projectors(source: LightField, lamps: Iterable[MirrorId]) -> list[tuple[MirrorPixels, ...]]:
-    """What projectors in the places of the cameras throw by mirrors.
+    """Light of projectors in the places of the cameras, thrown by mirrors.
 
     By one for each lamp, or by both halves of one on the seam.
     """

@@ -143,7 +143,7 @@ def lit_scene(scene: Scene, lights: PointLights, exposure: float) -> Scene:
 
 @dataclass(frozen=True)
 class SeenSpots:
-    """What a camera's rays see of the object."""
+    """Points of the object that a camera's rays see."""
 
     pixel: Ints  # row * width + column, ascending, (r,)
     spots: Spots  # where they meet it, (r,)
@@ -192,7 +192,7 @@ def write_reflectance(
 
 
 def seen_spots(frame: CameraFrame, scene: Scene) -> SeenSpots:
-    """What the captured rays of a camera see of the object."""
+    """Points of the object that the captured rays of a camera see."""
 
     def band(rows: range) -> SeenSpots:
         part = frame.read(slice(rows.start, rows.stop))

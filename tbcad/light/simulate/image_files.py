@@ -1,4 +1,4 @@
-"""Images as files, each replaced as a whole, and several side by side in one."""
+"""Images as files, each replaced atomically, and several side by side in one."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -20,7 +20,7 @@ quick_png = partial(image_bytes, compress_level=3)
 
 
 def write_images(images: Mapping[Path, Bytes]) -> None:
-    """Write images (h, w, 3) into one folder, each replaced as a whole, none before all are made.
+    """Write images (h, w, 3) into one folder, each replaced atomically, none before all are made.
 
     InputError: the folder cannot be written.
     """

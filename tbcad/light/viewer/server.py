@@ -58,7 +58,7 @@ class ViewServer(ThreadingHTTPServer):
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """What a browser that was given the address calls this server."""
+        """Names by which a browser with the address calls this server."""
         return tuple(f"{name}:{self.server_port}" for name in NAMES)
 
     def handle_error(self, request: Any, client_address: Any) -> None:

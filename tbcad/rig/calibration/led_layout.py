@@ -165,7 +165,7 @@ def led_room(export: ExportedDesign) -> LedRoom:
 
 
 def shell_information(export: ExportedDesign, leds: Floats) -> SphereInformation:
-    """What LEDs tell of each mirror of camera a, by one photograph."""
+    """Information of LEDs on each mirror of camera a, by one photograph."""
     prior = only_spheres(designed_shell(export.reflectors[0], leds))
     virtual = export.reflectors[0].u * mirror_distance(export)
     hidden = hidden_by_object(export.spec.prototype.stage, leds, virtual, export.capture_mm / 2)

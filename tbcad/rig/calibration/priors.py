@@ -1,4 +1,4 @@
-"""What is known of a machine before it is photographed: the errors of the process that made it.
+"""Priors of a machine: the errors of the process that made it.
 
 Figures of a process come from tbcad/tolerancing/process/*.toml, each with its source there. What no
 process says is a judgement, below.
@@ -196,7 +196,7 @@ def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:
             ) from None
         if not (0 <= values[0] < balls and values[1] > 0 and values[2] > 0):
             raise InputError(
-                f"--measured {text}: allowed is ball 1 to {balls}, with a radius and a deviation "
+                f"--measured {text}: allowed is ball 1 to {balls}, with a radius and its sigma "
                 "above 0 mm: change it"
             )
         measured.append(values)

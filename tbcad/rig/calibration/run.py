@@ -85,7 +85,7 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
     """
     folder, exports, out = Path(options.run), Path(options.exports), Path(options.out)
     progress, detail = options.progress, options.detail
-    progress("run and export")
+    progress("run and build")
     process = load_process(options.process or DEFAULT_PROCESS, options.settings)
     run = read_run(folder)
     check_same_export(folder, run.record, exports)
@@ -141,7 +141,7 @@ def _truth(run: Run, setup: Setup) -> Machine | None:
 
 
 def _basis(run: Run, setup: Setup, options: CalibrateOptions, process: Process) -> dict[str, Any]:
-    """What the calibration is based on, for its record."""
+    """Basis of the calibration, for its record."""
     return {
         "run": str(run.folder.resolve()),
         "exports": str(setup.export.folder.resolve()),

@@ -1,7 +1,7 @@
-"""What calibration can reach by LEDs, noise and process: bounds of Cramer and Rao, no photograph.
+"""Accuracy of calibration by LEDs, noise and process: Cramér-Rao bounds, no photograph.
 
 Two questions: what four LEDs tell of each sphere alone, all else known; and what a whole run tells
-of the whole machine, nothing known but by the process.
+of the whole machine, with the process as prior.
 """
 
 from dataclasses import replace
@@ -40,16 +40,16 @@ ONE_BALL = "free, 50 stops"
 STOPS_OF_ONE = 50  # photographs of one ball on its base
 SHARES = (50, 95)  # percent of the mirrors
 NOTES = (
-    "Bounds of Cramer and Rao: no estimate without bias is better. mrad: root mean square angle "
+    "Cramér-Rao bounds: no unbiased estimate is better. mrad: root mean square angle "
     "between a ray and the true one; mm: root mean square distance at the object's centre; both "
     "median and 95 % of the mirrors.",
     "spheres: camera, axis, angles and LEDs known exactly, one photograph; each sphere alone. "
     "LEDs hidden by an object that fills its room do not count.",
-    "machine: all of a run with nothing known but by the process; besides a motion of the whole "
+    "machine: all of a run, with the process as prior; after alignment of the whole "
     "machine. Highlights within the picture that the object's room does not hide; shadows of other "
     "balls are not taken off.",
     "best: found by tbcad in pairs half a turn apart, within the stage's room; design: of the "
-    "export.",
+    "build.",
 )
 
 

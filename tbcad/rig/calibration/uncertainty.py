@@ -100,7 +100,7 @@ def besides_motions(
 
 
 def motion_fit(motions: Floats) -> Floats:
-    """What tells the motion (c,) that fits n errors of rays (4 m,) best, (c, 4 m).
+    """Matrix that gives the motion (c,) that fits n errors of rays (4 m,) best, (c, 4 m).
 
     A rotation counts by what it does at the edge of the object's room.
     """

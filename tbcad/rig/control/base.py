@@ -26,7 +26,7 @@ class Base:
     switch_s = 0.02  # two lines
 
     def __init__(self, grbl: Grbl, plan: ControlPlan) -> None:
-        """Drive a machine as its export says."""
+        """Drive a machine as its build says."""
         self._grbl, self._plan = grbl, plan
         self._offset: float | None = None
         self._at = plan.program.start.angle_deg
@@ -49,7 +49,7 @@ class Base:
         )
 
     def settings_that_differ(self) -> dict[int, tuple[float | None, float]]:
-        """Settings of the controller that are not the export's: by number, found and wanted.
+        """Settings of the controller that are not the build's: by number, found and wanted.
 
         A board without a setting is without what the setting switches off by zero.
         """
@@ -163,7 +163,7 @@ class Base:
         return wrong and f"{wrong}; {PIN_FIRST}"
 
     def _hold_and_darken(self) -> str:
-        """What is wrong, if anything."""
+        """Fault, if there is one."""
         self._grbl.hold()
         status = self._grbl.status_in_alarm()
         if status is None:

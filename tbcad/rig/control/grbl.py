@@ -126,7 +126,7 @@ class Grbl:
         return f"{GONE} (silent for {seconds:.0f} s; its last state: {state})"
 
     def _answer(self, line: str, expected_s: float, silent_s: float) -> list[Message] | None:
-        """What came before the `ok`; None if it is lost."""
+        """Lines before the `ok`; None if it is lost."""
         began, idle, others = monotonic(), None, list[Message]()
         self._heard = began
         while True:

@@ -163,13 +163,13 @@ class KlipperState:
 
     @property
     def what(self) -> str:
-        """What has happened."""
+        """Description of the event."""
         first = next((line for line in self.message.splitlines() if line.strip()), "")
         return f"Klipper is in state {self.name}" + (f": {first.strip()}" if first else "")
 
     @property
     def safe(self) -> str:
-        """What is safe to do."""
+        """Safe next step."""
         words = WORDS["safe"]
         return str(words.get(self.name, words["other"])).format(hold=HOLD_FIRST)
 

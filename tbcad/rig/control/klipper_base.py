@@ -94,7 +94,7 @@ def _text(path: Path) -> str:
 
 
 def differences(wanted: dict[str, dict[str, str]], found: dict[str, Any]) -> Iterator[str]:
-    """What a printer has otherwise than klipper.cfg, by its configfile as Klipper parsed it."""
+    """Differences of a printer from klipper.cfg, by its configfile as Klipper parsed it."""
     for section, options in wanted.items():
         if not isinstance(has := found.get(section), dict):
             yield f"[{section}] is missing"

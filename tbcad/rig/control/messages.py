@@ -36,7 +36,7 @@ UNKNOWN = "its meaning is in the manual of the controller's firmware"
 
 
 class SerialPort:
-    """What a controller is spoken to through: pyserial's port, whose errors are a machine's."""
+    """Port to a controller: pyserial's, whose errors are a machine's."""
 
     def __init__(self, name: str) -> None:
         """Open a port."""
@@ -143,7 +143,7 @@ def firmware_of(texts: list[str]) -> str:
 
 
 def parse(line: str) -> Message:
-    """What a line says."""
+    """Meaning of a line."""
     if line == "ok":
         return Message("ok", line)
     if match := _CODE.match(line):

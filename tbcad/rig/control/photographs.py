@@ -91,7 +91,7 @@ def are_near(one: float, other: float) -> bool:
 
 @dataclass(frozen=True)
 class ImageFacts:
-    """What a photograph's file says."""
+    """Contents of a photograph's file."""
 
     size_px: tuple[int, int]  # columns and rows
     model: str  # of the camera; empty if the file does not say

@@ -1,4 +1,4 @@
-"""What an export says of a run: stops, lights, times, settings, and the motions of its program.
+"""Plan of a run, from a build: stops, lights, times, settings, and the motions of its program.
 
 Pauses of the controller's program become questions to the operator, and what it does for each
 photograph is done by the run: a light, the camera, the light off again.
@@ -56,7 +56,7 @@ _KLIPPER = _Words(
 )
 _TURN = "turn the object"
 FILES = (DESIGN_FILE, MirrorRow.FILE, RECORD, BallRow.FILE, PictureRow.FILE, StopRow.FILE)
-"""What a run depends on, besides the program, and settings that can be sent."""
+"""Files that a run depends on, besides the program, and settings that can be sent."""
 TURNS: tuple[Literal[0, 180], ...] = (0, 180)
 ANGLE_DEG = 1e-3  # a program's angles are truncated to 1e-4
 DIRECTION = 3  # the setting that is changed where the base turns against its arrow
@@ -64,7 +64,7 @@ _SETTING = re.compile(r"\$(\d+)=(-?\d+(?:\.\d+)?)$")
 PIN_FIRST = (
     "leave the supply on, for only the motor holds the base: zero pin in first, or the base falls"
 )
-"""What is safe when a machine does not do what it is told."""
+"""Safe next step when a machine does not obey."""
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ Shoot = Callable[[str, float | None], Shot]
 
 
 class LightState(StrEnum):
-    """What to think of a photograph."""
+    """Verdict on a photograph."""
 
     GOOD = "good"
     SATURATED = "saturated"
@@ -45,7 +45,7 @@ class LightState(StrEnum):
 
 @dataclass(frozen=True)
 class Seen:
-    """What a photograph shows."""
+    """Levels of a photograph."""
 
     state: LightState
     peak: float  # level of its brightest light, of the largest number

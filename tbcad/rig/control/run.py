@@ -265,7 +265,7 @@ def _turned(remaining: list[Shots]) -> bool:
 
 
 def dry_run(options: RunOptions) -> DryRun:
-    """What a run would do, without port and camera; nothing is written."""
+    """Plan of a run, without port and camera; nothing is written."""
     plan, chosen = _prepared(options)
     taken = set(read_run(Path(options.out)).exposures) if options.resume else set[str]()
     remaining = chosen.left(taken)

@@ -29,7 +29,7 @@ SHOWN_STOPS = 3
 
 @dataclass(frozen=True)
 class RunSelection:
-    """What is photographed, and how."""
+    """Choice of photographs, and their settings."""
 
     frames: tuple[Frame, ...]  # positions in order
     phases: tuple[Phase, ...]  # lights at each, in order
@@ -66,7 +66,7 @@ def chosen_phases(
     wrong = [name for name in named if name not in (*known, "leds")]
     if wrong:
         raise InputError(
-            f"--phases names {wrong[0]!r:.40}, this export has {', '.join(known)}: name some of "
+            f"--phases names {wrong[0]!r:.40}, this build has {', '.join(known)}: name some of "
             "these, or leds for all LEDs"
         )
     chosen = {phase.name: phase for phase in plan.phases if phase.name in named}
@@ -174,7 +174,7 @@ def size_text(size: float) -> str:
 
 @dataclass(frozen=True)
 class Outcome(InFolder):
-    """What a run came to."""
+    """Outcome of a run."""
 
     folder: Path
     wanted: int  # number of photographs that are wanted in all
@@ -193,7 +193,7 @@ class Outcome(InFolder):
 
 @dataclass(frozen=True)
 class DryRun:
-    """What a run would do."""
+    """Plan of a run."""
 
     plan: ControlPlan
     remaining: list[Shots]
@@ -221,14 +221,14 @@ def outcome_lines(outcome: Outcome, resume: str) -> Iterator[str]:
 
 
 def preflight_lines(outcome: Outcome) -> Iterator[str]:
-    """What a preflight that found nothing wrong came to."""
+    """Outcome of a preflight without a fault."""
     yield "every exposure will do; no photograph was kept"
     if outcome.unsafe:
         yield f"LOOK AT THE MACHINE: {outcome.unsafe}"
 
 
 def dry_run_record(found: DryRun) -> dict[str, object]:
-    """What a run would do, for other programs."""
+    """Plan of a run, for other programs."""
     positions = [{"title": shots.title, "phases": list(shots.phases)} for shots in found.remaining]
     return {
         "schema": "tbcad-run-plan/1",
@@ -240,7 +240,7 @@ def dry_run_record(found: DryRun) -> dict[str, object]:
 
 
 def dry_run_lines(found: DryRun) -> Iterator[str]:
-    """What a run would do."""
+    """Plan of a run."""
     first = found.remaining[0] if found.remaining else None
     positions = len(found.remaining)
     yield f"{count(found.remaining)} photographs at {positions} positions would be taken"

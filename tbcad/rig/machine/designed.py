@@ -115,7 +115,7 @@ def machine_run(
     if len(machine.radius) != len(plan):
         raise InputError(
             f"the machine has {len(machine.radius)} balls, {export.folder} has {len(plan)}: name "
-            "the export that the machine was calibrated with"
+            "the build that the machine was calibrated with"
         )
     balls = _balls(plan, machine, frames, TURNS[half])
     return prototype_run(export.reflectors[half], plan, half, machine.camera, balls)

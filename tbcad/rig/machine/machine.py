@@ -113,7 +113,7 @@ class Machine:
         return replace(self, angle=self.angle[frames], **some)
 
     def moved(self, shift: Floats) -> "Machine":
-        """The same machine as a whole elsewhere, by a shift in mm, (3,)."""
+        """The same machine, moved rigidly by a shift in mm, (3,)."""
         return replace(
             self,
             camera=replace(self.camera, pinhole=self.camera.pinhole + shift),

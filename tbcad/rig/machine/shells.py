@@ -94,7 +94,7 @@ def plan_of(export: ExportedDesign, geometry: Geometry, frames: tuple[Frame, ...
 
 
 def tied(machines: list[tuple[Machine, tuple[Frame, ...]]]) -> list[Machine]:
-    """Machines, each moved as a whole to where its LEDs are those of the first.
+    """Machines, each moved rigidly to where its LEDs are those of the first.
 
     Photographs alone do not tell where a machine is; but both cameras of a shell see the same LEDs.
     One prototype stays where it is.
@@ -170,6 +170,4 @@ def export_of(calibration: Path) -> Path:
     try:
         return Path(CalibrationRecord.read(next(filter(Path.is_file, files), files[0])).exports)
     except InputError:
-        raise InputError(
-            f"{calibration} does not name its export: name it with --exports"
-        ) from None
+        raise InputError(f"{calibration} does not name its build: name it with --exports") from None

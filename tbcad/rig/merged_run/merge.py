@@ -136,7 +136,7 @@ def _halves(
     calibrated: tuple[Machine, tuple[Frame, ...]],
     options: MergeOptions,
 ) -> list[HalfMerge]:
-    """What one machine has photographed: a prototype for both cameras, a shell's camera for one."""
+    """Photographs of one machine: a prototype for both cameras, a shell's camera for one."""
     machine, frames = calibrated
     record, camera = run.record, machine.camera
     if (record.width_px, record.height_px) != (camera.width_px, camera.height_px):
@@ -204,7 +204,7 @@ def write_merge(folder: Path, merge: Merge, progress: Progress) -> dict[str, Any
 
 
 def based_on(half: HalfMerge) -> dict[str, Any]:
-    """What a camera's picture is based on, after its merge, for capture.json."""
+    """Sources of a camera's picture after its merge, for capture.json."""
     missing = half.missing_mirrors()
     run, known = half.photographs.run, [f for f in half.photographs.frames if f is not None]
     phases = LIT, half.photographs.dark_phase

@@ -64,7 +64,7 @@ def corrections(options: MergeOptions, camera: LensCamera) -> Corrections:
 
 
 def cos4_gain(camera: LensCamera) -> Singles:
-    """What makes good the loss of light by the fourth power of the cosine, (h, w, 1)."""
+    """Factors that correct vignetting by the fourth power of the cosine, (h, w, 1)."""
     rows, gain = np.arange(camera.height_px), np.empty((camera.height_px, camera.width_px, 1))
     columns = np.arange(camera.width_px)
     for row in rows:
@@ -74,7 +74,7 @@ def cos4_gain(camera: LensCamera) -> Singles:
 
 
 def flat_field_gain(files: Sequence[AnyPath], encoding: Encoding, camera: LensCamera) -> Singles:
-    """What makes the mean of photographs of an even surface even, (h, w, 3).
+    """Factors that make the mean of photographs of an even surface even, (h, w, 3).
 
     Pixels with next to no light, beyond the lens's picture, show nothing.
 
@@ -108,7 +108,7 @@ def _table(kind: np.dtype[np.uint8] | np.dtype[np.uint16], encoding: Encoding) -
 
 @dataclass(frozen=True)
 class CorrectedPhotographs:
-    """What the photographs of one run of the base show."""
+    """Photographs of one run of the base."""
 
     run: Run
     frames: tuple[Frame | None, ...]  # of each stop; None where the run or the machine has none

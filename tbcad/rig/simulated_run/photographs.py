@@ -88,7 +88,7 @@ class SimulatedRun:
 
     @cached_property
     def maps(self) -> PixelMaps:
-        """What is fixed to the pixels."""
+        """Pattern that is fixed to the pixels."""
         return pixel_maps(self.built.machine.camera, self.directions, self.chain.sensor, self.seed)
 
     @cached_property
@@ -156,7 +156,7 @@ def object_light(
     turned: bool,
     walls: GrooveWalls = NO_WALLS,
 ) -> Colours:
-    """What a camera sees of a lit object, 0 to 255, (h, w, 3).
+    """Picture of a lit object by a camera, 0 to 255, (h, w, 3).
 
     Its pixels have directions (h, w, 3); balls are (k, 8) in the frame, or with forms behind these
     columns. The scene is the object as it stands in the first run; it may be turned by 180 degrees.

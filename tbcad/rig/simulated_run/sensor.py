@@ -44,7 +44,7 @@ class SimulatedSensor:
 
 @dataclass(frozen=True)
 class PixelMaps:
-    """What is fixed to the pixels (h, w) of one camera."""
+    """Pattern that is fixed to the pixels (h, w) of one camera."""
 
     transmission: Signal  # of lens and dust, 0 to 1, (h, w)
     hot: Ints  # numbers of the hot pixels, counted row by row, (p,)

@@ -39,7 +39,7 @@ class SmoothField:
         return len(self.points)
 
     def basis(self, places: Floats) -> Floats:
-        """What each random number adds to the field at places (p, 3), (p, K)."""
+        """Share of each random number in the field at places (p, 3), (p, K)."""
         kernel = covariance(places, self.points, self.length)
         solved = np.linalg.solve(self.factor, kernel.T).T
         return np.ascontiguousarray(solved, dtype=np.float64)
@@ -81,7 +81,7 @@ def pivots(points: Floats, length: float) -> Ints:
 
 @dataclass(frozen=True)
 class WarpMap:
-    """What K random numbers for each axis do to the m mirrors of one half."""
+    """Effect of K random numbers for each axis on the m mirrors of one half."""
 
     basis: Floats  # of the field at q points of each mirror, the apex first, (K, m q)
     fit: Floats  # sphere and astigmatism from displacements along the normals, (m, 6, q)
@@ -129,7 +129,7 @@ def field_values(basis: Floats, numbers: Floats) -> Floats:
 
 
 def warp_map(table: Floats, cell_radius: Floats, walls: GrooveWalls, field: SmoothField) -> WarpMap:
-    """What a field does to a half: see `EdgeModel` for its table (m + 2, 7) and cell radii (m,)."""
+    """Effect of a field on a half: see `EdgeModel` for its table (m + 2, 7) and cell radii (m,)."""
     apex, foot = table[:-2, :3], table[-1]
     points, normal = mirror_points(table[:-2], RING_SHARE * cell_radius)
     x, y = RING_SHARE * np.vstack([np.zeros(2), _circle()]).T

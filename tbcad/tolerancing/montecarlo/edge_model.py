@@ -172,7 +172,7 @@ def edge_model(at: Reflector) -> EdgeModel:
 
 
 def warp_maps_of(models: EdgeModels, errors: Errors) -> WarpMaps | None:
-    """What the warp of a process does to both halves; None where it is none of neighbours."""
+    """Effect of a process's warp on both halves; None where neighbours share none."""
     length = errors.warp.length
     if errors.warp.spread == 0 or length == 0:
         return None

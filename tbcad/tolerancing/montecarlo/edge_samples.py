@@ -162,7 +162,7 @@ def least_sample(samples: Floats) -> int:
 
 @compiled_loop
 def lower_bound(samples: Floats, least: int) -> float:
-    """What no distance squared between the samples is below; `least`: see `least_sample`."""
+    """Lower bound of the squared distance between the samples; `least`: see `least_sample`."""
     distances = samples[DISTANCE:]
     bound: float = distances[least] - MAX_FALL * rise_beside(distances, SAMPLES, least)
     return bound

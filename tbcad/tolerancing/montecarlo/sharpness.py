@@ -86,7 +86,7 @@ class BuiltReflector(SubstitutedReflector):
 
     @property
     def walls(self) -> GrooveWalls:
-        """What ends mirrors on pedestals."""
+        """Walls that end mirrors on pedestals."""
         return self.built_walls
 
     def boxes(self) -> Ints:

@@ -21,7 +21,7 @@ Source: TypeAlias = Annotated[str, Field(pattern=r"\S", max_length=2000)]
 
 
 class Fact(Section):
-    """What a workshop is told of a step."""
+    """Words of a step for a workshop."""
 
     value: str = Field(pattern=r"^[ -~]*[!-~][ -~]*$", max_length=120)
     """In words, ASCII."""
@@ -30,7 +30,7 @@ class Fact(Section):
 
 
 class Instrument(Fact):
-    """What measures the form of mirrors."""
+    """Instrument that measures the form of mirrors."""
 
     uncertainty_um: float = Field(gt=0, le=1000)
     """Expanded uncertainty (k = 2) of a height within a mirror and its neighbours, micrometres."""
@@ -171,7 +171,7 @@ class ChainStep(Section):
     mandrel: bool = False
     """Whether what it makes is the negative, from which a later step takes the shell."""
     material: Fact | None = None
-    """What it makes the part of, with temper; none: it works on what is there."""
+    """Material of the part, with temper; none: the step works on what is there."""
     treatment: Fact | None = None
     """How stress is relieved, or what protects a coat."""
     measured_with: Instrument | None = None

@@ -66,7 +66,7 @@ class Process(Section):
     steps: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
     """Steps of a chain, whose errors are added up; none: the figures are the process' own."""
     made: Annotated[tuple[ChainStep, ...], BeforeValidator(as_tuple)] = ()
-    """What a workshop is told: each step with material, treatment and instrument."""
+    """Words for a workshop: each step with material, treatment and instrument."""
     mandrel_cutter_mm: float | None = Field(None, ge=0, le=100)
     """Radius of the cutter of a mandrel, the shell's negative that the shell is taken from; none:
     the shell itself is made."""

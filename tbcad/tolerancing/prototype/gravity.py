@@ -1,4 +1,4 @@
-"""What gravity does to a prototype at its stops, as its build worked it out."""
+"""Effect of gravity on a prototype at its stops, as its build worked it out."""
 
 from dataclasses import dataclass, replace
 
@@ -37,7 +37,7 @@ def weightless(plan: Plan) -> Gravity:
 
 
 def read_gravity(export: ExportedDesign, plan: Plan) -> Gravity:
-    """What gravity does at the stops of a plan; displacements are zero where none are known.
+    """Effect of gravity at the stops of a plan; displacements are zero where none are known.
 
     Motor and belt yield to the base's weight: see tbcad.prototype.drive.drive; carrier and frame
     bend: see tbcad.prototype.gravity. InputError if a file is missing, malformed, or of another

@@ -1,1 +1,1 @@
-"""What the simulated light meets: object, mirrors and cameras."""
+"""Scene of the simulated light: object, mirrors and cameras."""

@@ -42,7 +42,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class RayHits:
-    """What n rays see."""
+    """Points that n rays see."""
 
     colour: Colours  # red, green, blue, 0 to 255, (n, 3), float32; the background where nothing is
     depth: Floats  # mm along the ray, infinite where nothing is, (n,)
@@ -149,7 +149,7 @@ def surface_hits(scene: Scene, origin: Floats, direction: Floats) -> SurfaceHits
 
 
 def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
-    """What rays from origins (n, 3) along unit directions (n, 3) see."""
+    """Points seen by rays from origins (n, 3) along unit directions (n, 3)."""
     colour = np.full((len(origin), 3), BACKGROUND, dtype=np.float32)
     depth = np.full(len(origin), np.inf)
     hits = surface_hits(scene, origin, direction)

@@ -53,7 +53,7 @@ class Reflector:
 
     @property
     def walls(self) -> GrooveWalls:
-        """What ends mirrors on pedestals, besides seam and foot."""
+        """Walls that end mirrors on pedestals, besides seam and foot."""
         return groove_walls(self.cells)
 
     @property
@@ -125,7 +125,7 @@ def reflectors(design: MirrorDesign) -> tuple[Reflector, Reflector]:
 
 
 class ExportedDesign(Record):
-    """What the simulation needs of an export."""
+    """Parts of a build that the simulation needs."""
 
     model_config = ConfigDict(frozen=True, arbitrary_types_allowed=True)
 

@@ -124,7 +124,7 @@ def refocus_everywhere(
 
 
 def _points_on_surface(view: Camera, depth: DepthFunction) -> Floats:
-    """What the middle of the lens sees in each pixel, (h, w, 3)."""
+    """Points of the surface seen from the middle of the lens, (h, w, 3)."""
     direction = unit_directions(view, range(view.height_px))
     flat = direction.reshape(-1, 3)
     distance = depth(np.broadcast_to(view.pinhole, flat.shape), flat)

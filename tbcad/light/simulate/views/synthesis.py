@@ -51,7 +51,7 @@ class SynthesisedView:
         return f"<SynthesisedView: {columns} x {rows}, {self.seen.mean():.1%} seen>"
 
     def _repr_png_(self) -> bytes:
-        """What notebooks show: the picture."""
+        """Picture, as notebooks show it."""
         return image_bytes(self.image)
 
 

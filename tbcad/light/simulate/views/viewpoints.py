@@ -160,7 +160,7 @@ def viewpoints_over_hemisphere(count: int, distance_mm: float) -> Viewpoints:
 
 @dataclass(frozen=True)
 class ViewTargets:
-    """What real cameras would see of a scene."""
+    """Pictures of a scene by real cameras."""
 
     scene: Scene
     cameras: list[Camera]
@@ -191,7 +191,7 @@ class ViewTargets:
 def pinhole_targets(
     scene: Scene, cameras: list[Camera], progress: Progress = lambda _: None
 ) -> ViewTargets:
-    """What pinhole cameras would see, ray-traced."""
+    """Pictures by pinhole cameras, ray-traced."""
     truths = []
     for k, view in enumerate(cameras):
         progress(f"truth {k + 1} of {len(cameras)}")

@@ -50,7 +50,7 @@ LARGEST_8_BIT = 255.0
 
 @dataclass(frozen=True)
 class _Read:
-    """What a frame's photographs show."""
+    """Spots in a frame's photographs."""
 
     spots: BrightSpots
     unmeasured: Counter[str]

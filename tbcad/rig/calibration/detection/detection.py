@@ -1,4 +1,4 @@
-"""What a detection gives: the highlights to calibrate from, and what was not used, and why.
+"""Result of a detection: the highlights to calibrate from, and those left out, with reasons.
 
 `tbcad.rig.calibration.detection.detect.detect(run, prior)` makes it of a run that
 tbcad.rig.runs has read, and of the prior of its machine, whose frames are those of the
@@ -32,7 +32,7 @@ LONGER = (
     "see that the LEDs shine, or photograph them with a longer exposure (tbcad run "
     "--preflight-only says which is right)"
 )
-ELSEWHERE = "is this the run of another export, or is the camera far out of place?"
+ELSEWHERE = "is this the run of another build, or is the camera far out of place?"
 # Light over what the same sphere shows of the same LED elsewhere, in the middle: an edge that hides
 # a tenth of a dome shifts its centroid by 0.16 px where its image has a radius of 2 px.
 LEAST, MOST = 0.94, 1.08
@@ -101,7 +101,7 @@ def _others(unmeasured: Counter[str], photographs: int) -> list[str]:
 
 
 def _step(spots: int, saturated: int, unmeasured: Counter[str], photographs: int) -> str:
-    """What to do, by what there is most of."""
+    """Next step, by the most frequent reason."""
     bright = spots + unmeasured["large"]
     if unmeasured["flooded"] > HALF * photographs:
         return f"most are full of light: darken the room, or {SHORTER}"

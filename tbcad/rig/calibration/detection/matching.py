@@ -38,7 +38,7 @@ FEW_PAIRS = 0.3  # share of the usual number of pairs: fewer are not where the m
 
 @dataclass(frozen=True)
 class Room:
-    """What an object on the stage may fill: an upright cylinder about z."""
+    """Room of an object on the stage: an upright cylinder about z."""
 
     radius: float  # mm
     bottom: float  # height z of the disc that it stands on, mm
@@ -46,7 +46,7 @@ class Room:
 
 
 def object_room(export: ExportedDesign) -> Room:
-    """What the design lets an object fill: on the disc, within the capture sphere."""
+    """Room of an object in the design: on the disc, within the capture sphere."""
     stage = export.spec.prototype.stage
     radius = stage.object_diameter_mm / 2
     return Room(radius, stage.top_mm, math.sqrt((export.capture_mm / 2) ** 2 - radius**2))

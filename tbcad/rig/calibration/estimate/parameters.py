@@ -30,7 +30,7 @@ SMALL = 1e-6  # radians: below, series replace quotients
 
 
 class Of(StrEnum):
-    """What the parameters of a block are of: they repeat for each."""
+    """Owners of a block's parameters, which repeat for each."""
 
     MACHINE = "machine"
     SERIES = "series"
@@ -80,7 +80,7 @@ class Block(StrEnum):
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of a machine before it is photographed: means, and standard deviations."""
+    """Prior of a machine: means and standard deviations."""
 
     mean: Machine
     # number of the series that each frame belongs to, each with an offset of its angles of its own,

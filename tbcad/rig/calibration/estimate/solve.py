@@ -163,7 +163,7 @@ def _minimum(problem: _Problem, start: Floats, robust: bool) -> tuple[Floats, in
 def _cost(
     problem: _Problem, residual: Floats, values: Floats, robust: bool
 ) -> tuple[float, Floats]:
-    """What is minimised, and each highlight's weight in the next step, (n,)."""
+    """Cost to minimise, and each highlight's weight in the next step, (n,)."""
     weight = problem.weight()
     square = np.where(np.isfinite(residual).all(axis=1), (residual**2).sum(axis=1), np.inf) * weight
     if not robust:

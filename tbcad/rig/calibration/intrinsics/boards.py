@@ -54,7 +54,7 @@ class Board:
 
     @property
     def words(self) -> str:
-        """What it is."""
+        """Name of the board."""
         kind = "checkerboard" if self.dictionary is None else f"ChArUco board, {self.dictionary}"
         return f"{kind} of {self.squares[0]} x {self.squares[1]} squares"
 

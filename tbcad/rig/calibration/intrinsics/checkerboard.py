@@ -94,7 +94,7 @@ def _photographs(folder: Path) -> list[Path]:
 
 @dataclass(frozen=True)
 class _Solution:
-    """What OpenCV finds: the values of `NAMES`, and turn and shift of each board."""
+    """Solution by OpenCV: the values of `NAMES`, and turn and shift of each board."""
 
     values: Floats
     poses: list[tuple[Floats, Floats]]

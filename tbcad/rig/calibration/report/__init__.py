@@ -1,1 +1,1 @@
-"""What a calibration found: the verdict in words, its record, tables and plots."""
+"""Report of a calibration: the verdict in words, its record, tables and plots."""

@@ -140,7 +140,7 @@ def _of_frames(found: Estimate) -> dict[Of, Ints]:
 def calibration_record(
     result: MachineCalibration, judged: CalibrationVerdict, basis: dict[str, Any]
 ) -> CalibrationRecord:
-    """What calibration.json says; the basis names run, export, process and lens."""
+    """Contents of calibration.json; the basis names run, build, process and lens."""
     return CalibrationRecord(
         **basis,
         verdict=judged.answer.value,

@@ -40,7 +40,7 @@ class Answer(StrEnum):
 
 @dataclass(frozen=True)
 class CalibrationVerdict:
-    """What to think of a calibration."""
+    """Verdict on a calibration."""
 
     answer: Answer
     rays: RayFigures
@@ -66,7 +66,7 @@ def verdict(result: MachineCalibration) -> CalibrationVerdict:
 
 
 def _rays(result: MachineCalibration) -> RayFigures:
-    """How well rays are known besides a motion of all, of those of one run, and as they are."""
+    """Accuracy of rays after alignment of all, of those of one run, and without alignment."""
     known = result.rays.known
     place, turn = known.relative.place_mm, known.relative.turn_mrad
     needed = NEEDED_PIXELS * known.pixel_mm
