@@ -44,6 +44,7 @@ PURE: dict[str, tuple[str, ...]] = {
     ),
     "shell.coverage": ("measure",),
     "shell.pixels": ("checks",),
+    "shell.lamps": ("object_light", "glare"),
     "shell.mirrors_found": ("checks",),
     "run.verify": ("area_checks",),
     "step.front_checks": ("cells_of_export",),
