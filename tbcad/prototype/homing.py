@@ -281,6 +281,7 @@ def homing_step(machine: AssembledMachine) -> Words:
         __name__,
         "homing",
         pin=machine.ref(home.pin),
+        brake=machine.has("brake"),
         motor=machine.has("motor"),
         no_motor=not machine.has("motor"),
         pin_mm=PIN_MM,

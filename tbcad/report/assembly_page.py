@@ -48,6 +48,8 @@ def page(told: Instructions, pictures: Mapping[str, bytes]) -> str:
         *(f"<p>{escape(text)}</p>" for text in about),
         "<h3>Tools</h3>",
         _list(told.tools),
+        "<h3>Printing</h3>",
+        _table(("Setting", "Value"), told.printing),
         "<nav><h3>Steps</h3><ol>",
         *(f'<li><a href="#{step.key}">{escape(step.title)}</a></li>' for step in told.steps),
         "</ol></nav>",

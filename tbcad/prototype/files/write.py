@@ -107,7 +107,7 @@ def export_prototype(
     steps = mounting_record(AssembledMachine(listed, record, (), sizes, built.parts))
     record.model_copy(update={"assembly_steps": steps}).write(folder / NAME)
     tools = coloured_meshes([_printed("tools", built, ("tool",))])  # on the bed, of no assembly
-    submit(write_book, folder, [*meshes, *tools], title)
+    submit(write_book, folder, [*meshes, *tools], title, spec.printer)
     radius = spec.optics.capture_diameter_mm / 2
     write_camera_sheet(folder, design.arrays[0], radius, built.rig_light)
     return spec
