@@ -276,10 +276,12 @@ def _switch(base: BaseLayout, place: _SwitchPlace, parts: Parts) -> Component:
 @planned("Switch and zero pin", "home_*", loose=("shafts",), near=("zero_disc",))
 def homing_step(machine: AssembledMachine) -> Words:
     """Switch, bracket and the zero pin."""
-    home = machine.record.home
+    home, homes = machine.record.home, machine.record.controller.firmware != "grbl"
     return told_words(
         __name__,
         "homing",
+        homes=homes,
+        unread=not homes,
         pin=machine.ref(home.pin),
         brake=machine.has("brake"),
         motor=machine.has("motor"),

@@ -133,12 +133,12 @@ def _front(told: Instructions) -> Iterator[Block]:
     """What is read before the first step: about, tools, times."""
     yield from _section("Before the first step", map(_paragraph, (*told.about, PICTURES)))
     yield from _section("Tools", _listed(told.tools))
-    yield from _section("Printing", ())
-    yield from _table((36.0, 136.0), ("setting", "value"), told.printing)
     rows = [(str(one.number), one.title, hours_text(told.minutes[one.key])) for one in told.steps]
     total = ("", "all", hours_text(sum(told.minutes.values())))
     yield from _section("Times", map(_paragraph, told.times))
     yield from _table((11.0, 131.0, 30.0), ("no.", "subassembly", "work"), [*rows, total])
+    yield from _section("Printing", ())
+    yield from _table((36.0, 136.0), ("setting", "value"), told.printing)
 
 
 def _parts(machine: AssembledMachine, told: Instructions) -> Iterator[Block]:

@@ -228,6 +228,18 @@ def test_a_braked_base_is_turned_with_voltage_on_the_brake(tmp_path: Path) -> No
         assert all(("24 V" in texts[key]) == told for key in ("motor", "homing", "stage"))
 
 
+def test_a_switch_that_is_not_read_may_stay_away(tmp_path: Path) -> None:
+    """GRBL 1.1 does not home."""
+    for firmware, read in (("grblhal", True), ("klipper", True), ("grbl", False)):
+        design, folder = belt_design(), tmp_path / firmware
+        design["bought"].append(bought("home_switch", "SWITCH-ROLLER"))
+        design["controller"]["firmware"] = firmware
+        folder.mkdir()
+        homing = of(assembly_steps(read_machine(write(folder, design, LOOSE))), "homing")
+        assert ("may stay away" in " ".join(homing.does)) != read
+        assert ("clicks the switch" in " ".join(homing.checks)) == read
+
+
 def test_the_wiring_names_terminals_of_the_board(tmp_path: Path) -> None:
     """Of each firmware that the board is named for, and its driver's place."""
     for firmware, words in (("grblhal", "FAN0 to FAN4"), ("klipper", "step_pin PF13")):
