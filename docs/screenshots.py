@@ -20,7 +20,7 @@ sys.path.insert(0, str(ROOT))  # for the tests' browser
 from tests.clients.browser import Browser, chromium  # noqa: E402
 from tests.clients.viewer_page import save_picture  # noqa: E402
 
-REPORT_PX, CHOSEN = (1280, 1210), 300  # the window; the virtual camera whose rays are shown
+REPORT_PX, CHOSEN = (1500, 1540), 300  # the window; the virtual camera whose rays are shown
 
 
 def save_report(browser: Browser, build: Path, file: Path) -> None:
