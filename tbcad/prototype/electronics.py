@@ -242,7 +242,8 @@ def wiring_layout(site: Site, before: FrameLayout) -> Wiring:
     # A rotary stage's current is its maker's.
     rated: Row = {"current_ma": site.drive.of_motor("rated_a") * MA_PER_A or None}
     brake = [BRAKE | {"part": site.drive.brake.name}] if site.drive.brake else []
-    rows += [HOME | {"output": f"limit {motion.axis}"}, MOTOR | motor | rated, *brake, SUPPLY]
+    home = [HOME | {"output": f"limit {motion.axis}"}] if motion.homes else []
+    rows += [*home, MOTOR | motor | rated, *brake, SUPPLY]
     on_cable = sum(float(row["length_mm"] or 0) for row in rows if row.get("wire") == CABLE)
     empty: Row = dict.fromkeys(WiringRow.columns())
     return Wiring(

@@ -228,16 +228,17 @@ def test_a_braked_base_is_turned_with_voltage_on_the_brake(tmp_path: Path) -> No
         assert all(("24 V" in texts[key]) == told for key in ("motor", "homing", "stage"))
 
 
-def test_a_switch_that_is_not_read_may_stay_away(tmp_path: Path) -> None:
+def test_without_a_switch_the_pin_alone_shows_angle_zero(tmp_path: Path) -> None:
     """GRBL 1.1 does not home."""
-    for firmware, read in (("grblhal", True), ("klipper", True), ("grbl", False)):
-        design, folder = belt_design(), tmp_path / firmware
-        design["bought"].append(bought("home_switch", "SWITCH-ROLLER"))
-        design["controller"]["firmware"] = firmware
+    for homes in (True, False):
+        design, folder = belt_design(), tmp_path / str(homes)
+        design["bought"] += [bought("home_switch", "SWITCH-ROLLER")] * homes
         folder.mkdir()
-        homing = of(assembly_steps(read_machine(write(folder, design, LOOSE))), "homing")
-        assert ("may stay away" in " ".join(homing.does)) != read
-        assert ("clicks the switch" in " ".join(homing.checks)) == read
+        steps = assembly_steps(read_machine(write(folder, design, LOOSE | {"ROD-4x40": 1})))
+        homing = of(steps, "homing")
+        assert "ROD-4x40" in {use.part for use in homing.parts}
+        assert ("Screw the switch" in homing.does[0]) == homes
+        assert ("clicks the switch" in " ".join(homing.checks)) == homes
 
 
 def test_the_wiring_names_terminals_of_the_board(tmp_path: Path) -> None:
