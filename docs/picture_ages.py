@@ -68,7 +68,9 @@ def _balls(build: Path) -> Iterable[str]:
 
 
 def _page(build: Path) -> Iterable[str]:
-    yield " ".join(UNSEEN.sub(" ", (build / "report.html").read_text(encoding="utf-8")).split())
+    """Words of the report as far as its picture reaches, without figures."""
+    text = (build / "report.html").read_text(encoding="utf-8").partition('<section id="checks"')[0]
+    yield " ".join(UNSEEN.sub(" ", text).split())
 
 
 SHOWN: dict[str, Callable[[Path], Iterable[str]]] = {
