@@ -13,7 +13,9 @@ Sources: grblHAL core gcode.c and issue 633; LinuxCNC M-codes, M62 to M65.
 """
 
 import math
+import tomllib
 from dataclasses import dataclass, replace
+from importlib.resources import files
 
 import numpy as np
 
@@ -82,6 +84,7 @@ BRAKE: Row = ON_CABLE | {
     **{"signal": "brake", "output": "supply", "supply_v": 24.0, "pins": "+ -"},
     "path": "to plus and minus behind the fuse; without voltage its spring holds the motor",
 }
+DRIVER = "DRIVER-2A"
 FUSE, SUPPLY_V = "FUSE-2A", 24.0
 SUPPLY: Row = ON_CABLE | {
     **{"signal": "supply", "part": "SUPPLY-24V", "output": "supply"},
@@ -239,7 +242,8 @@ def wiring_layout(site: Site, before: FrameLayout) -> Wiring:
     # A rotary stage's current is its maker's.
     rated: Row = {"current_ma": site.drive.of_motor("rated_a") * MA_PER_A or None}
     brake = [BRAKE | {"part": site.drive.brake.name}] if site.drive.brake else []
-    rows += [HOME | {"output": f"limit {motion.axis}"}, MOTOR | motor | rated, *brake, SUPPLY]
+    home = [HOME | {"output": f"limit {motion.axis}"}] if motion.homes else []
+    rows += [*home, MOTOR | motor | rated, *brake, SUPPLY]
     on_cable = sum(float(row["length_mm"] or 0) for row in rows if row.get("wire") == CABLE)
     empty: Row = dict.fromkeys(WiringRow.columns())
     return Wiring(
@@ -329,14 +333,23 @@ def wiring_step(machine: AssembledMachine) -> Words:
     """Lines of the controller, one each; without lamps, where light comes from instead."""
     rows = machine.wiring
     switched = [{"row": row, "name": row.signal.replace("_", " ")} for row in rows if row.on]
+    controller = machine.record.controller
     return told_words(
         __name__,
         "wiring",
-        board=machine.ref(machine.record.controller.board),
+        board=machine.ref(controller.board),
+        driver=DRIVER in machine.bill.items and machine.ref(DRIVER),
+        terminals=_terminals(controller.board, controller.firmware),
         lines=[{"line": _line(machine, row)} for row in rows],
         no_lamps=not machine.record.lamps,
         switched=switched,
     )
+
+
+def _terminals(board: str, firmware: str) -> str:
+    """Where a board has its outputs, as text; empty where that is not known."""
+    text = files(__package__).joinpath("electronics.toml").read_text("utf-8")
+    return str(tomllib.loads(text)["boards"].get(board, {}).get(firmware, ""))
 
 
 def _line(machine: AssembledMachine, row: WiringRow) -> str:

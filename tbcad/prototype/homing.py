@@ -102,6 +102,8 @@ class HomingLayout(Mounted):
 def homing_layout(site: Site, before: FrameLayout) -> HomingLayout:
     """Disc, bracket and switch for a base and the plate behind it.
 
+    Only a controller that homes has a switch and its bracket.
+
     SpecError when the swing leaves no room for the tab.
     """
     base, parts, plate = site.base, site.parts, before.of(BearingHead).plate
@@ -112,13 +114,14 @@ def homing_layout(site: Site, before: FrameLayout) -> HomingLayout:
     pin = choose_part(parts, "shafts", "the zero pin", hint, diameter_mm=PIN_MM, length_mm=length)
     # Either moves by half of its play in each of its two holes.
     error = (PIN_HOLE_MM - PIN_MM) / PIN_OUT_MM + (KEY_HOLE_MM - KEY_MM) / base.hub.key_radius
+    homes = site.spec.prototype.motion.homes
     return HomingLayout(
         angles=angles,
         disc=_disc(base, place, angles),
-        printed=(_bracket(base, plate, place),),
-        purchased=(_switch(base, place, parts),),
-        fasteners=_fasteners(base, plate, place, parts),
-        listed={pin.name: 1, SWITCH: 1},
+        printed=(_bracket(base, plate, place),) if homes else (),
+        purchased=(_switch(base, place, parts),) if homes else (),
+        fasteners=_fasteners(base, plate, place, parts) if homes else (),
+        listed={pin.name: 1, SWITCH: int(homes)},
         pin=pin.name,
         error_deg=math.degrees(error),
     )
@@ -273,14 +276,16 @@ def _switch(base: BaseLayout, place: _SwitchPlace, parts: Parts) -> Component:
     return Component("home_switch", parts[SWITCH].what, added, holes, part=SWITCH)
 
 
-@planned("Switch and zero pin", "home_*", loose=("shafts",), near=("zero_disc",))
+@planned("Switch and zero pin", "home_*", "zero_disc", loose=("shafts",), near=("zero_disc",))
 def homing_step(machine: AssembledMachine) -> Words:
     """Switch, bracket and the zero pin."""
     home = machine.record.home
     return told_words(
         __name__,
         "homing",
+        homes=machine.has("home_switch"),
         pin=machine.ref(home.pin),
+        brake=machine.has("brake"),
         motor=machine.has("motor"),
         no_motor=not machine.has("motor"),
         pin_mm=PIN_MM,

@@ -48,6 +48,8 @@ def page(told: Instructions, pictures: Mapping[str, bytes]) -> str:
         *(f"<p>{escape(text)}</p>" for text in about),
         "<h2>Tools</h2>",
         _list(told.tools),
+        "<h2>Printing</h2>",
+        _table(("Setting", "Value"), told.printing),
         "<nav><h2>Steps</h2><ol>",
         *(f'<li><a href="#{step.key}">{escape(step.title)}</a></li>' for step in told.steps),
         "</ol></nav>",

@@ -13,27 +13,32 @@ import pyvista
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.tables import BallRow
 from tbcad.report.page.bodies import Body, prototype_bodies
+from tbcad.report.shell_pictures import camera_that_shows
 from tbcad.types import Floats, Ints
 
-SIZE = (1600, 800)
+PANEL_PX = 800  # width and height of a picture beside others
 ANGLE_DEG = 30.0
 UP = (0.0, 0.0, 1.0)
 # Where it is seen from, and what points up in the picture. Camera a is toward +x.
 SIDES = (
     ("from the camera's side (+x)", (1.0, 0.0, 0.0), UP),
     ("from the right (+y)", (0.0, 1.0, 0.0), UP),
-    ("from the left (-y)", (0.0, -1.0, 0.0), UP),
+    ("from behind (-x)", (-1.0, 0.0, 0.0), UP),
     ("from above (+z)", UP, (0.0, 1.0, 0.0)),
 )
-SIDES_BORDER = 1.15  # height and width of a picture, in the longest side of all that is drawn
-ROWS = {"sides": 2}  # of pictures; one where nothing is said
+SIDES_BORDER = 1.06  # height and width of a picture, in the longest side of all that is drawn
+RIG_FROM = (2.5, -1.9, 1.0)  # the whole: from the camera's side
+# Rows and columns of pictures, and pixels of each; two side by side where nothing is said.
+GRIDS = {"sides": (2, 2, PANEL_PX), "rig": (1, 1, 1400)}
 
 
 def draw(folder: Path, subject: str, picture: Path) -> None:
     """Draw one of SUBJECTS of an export with a prototype to a PNG file."""
-    rows = ROWS.get(subject, 1)
-    size = (SIZE[0], rows * SIZE[1])
-    plotter = pyvista.Plotter(off_screen=True, shape=(rows, 2), window_size=size, border=False)
+    rows, columns, side = GRIDS.get(subject, (1, 2, PANEL_PX))
+    size = (columns * side, rows * side)
+    plotter = pyvista.Plotter(
+        off_screen=True, shape=(rows, columns), window_size=size, border=False
+    )
     bodies = [one for one in prototype_bodies(folder) if one.name != "camera_view"]
     SUBJECTS[subject](plotter, folder, bodies)
     plotter.screenshot(picture)
@@ -41,13 +46,17 @@ def draw(folder: Path, subject: str, picture: Path) -> None:
 
 
 def _whole(plotter: pyvista.Plotter, _: Path, bodies: Sequence[Body]) -> None:
-    """The whole prototype with purchased parts, from two sides."""
-    _from_two_sides(plotter, bodies, ((-0.6, -2.8, 0.9), (2.5, -1.6, 1.0)))
+    """The whole prototype without its shroud, as large as the picture."""
+    _look(plotter, _without_shroud(bodies), RIG_FROM)
+
+
+def _without_shroud(bodies: Iterable[Body]) -> list[Body]:
+    return [body for body in bodies if body.group not in ("views", "shroud")]
 
 
 def _sides(plotter: pyvista.Plotter, _: Path, bodies: Sequence[Body]) -> None:
     """The prototype without its shroud from four sides, all to one scale."""
-    shown = [body for body in bodies if body.group not in ("views", "shroud")]
+    shown = _without_shroud(bodies)
     for number, (title, eye, up) in enumerate(SIDES):
         plotter.subplot(*divmod(number, 2))
         _add(plotter, shown)
@@ -95,11 +104,7 @@ def _seat(plotter: pyvista.Plotter, folder: Path, bodies: Sequence[Body]) -> Non
 
 def _exploded(plotter: pyvista.Plotter, _: Path, bodies: Sequence[Body]) -> None:
     """All parts but the shroud apart, as the report's page shows them."""
-    shown = [
-        body._replace(vertices=body.vertices + body.apart)
-        for body in bodies
-        if body.group not in ("views", "shroud")
-    ]
+    shown = [body._replace(vertices=body.vertices + body.apart) for body in _without_shroud(bodies)]
     _from_two_sides(plotter, shown, ((-0.5, -2.6, 0.8), (2.3, -1.5, 1.1)))
 
 
@@ -135,10 +140,17 @@ def _from_two_sides(
     """Look from two directions at all bodies."""
     for column, eye in enumerate(eyes):
         plotter.subplot(0, column)
-        _add(plotter, bodies)
-        plotter.view_vector(tuple(eye), viewup=UP)
-        plotter.camera.view_angle = ANGLE_DEG
-        plotter.reset_camera()
+        _look(plotter, bodies, eye)
+
+
+def _look(plotter: pyvista.Plotter, bodies: Sequence[Body], eye: Sequence[float] | Floats) -> None:
+    """Look from a direction at bodies, which just fit into the picture."""
+    _add(plotter, bodies)
+    points = np.concatenate([body.vertices for body in bodies])
+    place, focus = camera_that_shows(points, -np.array(eye, dtype=float))
+    plotter.camera_position = [tuple(place), tuple(focus), UP]
+    plotter.camera.view_angle = ANGLE_DEG
+    plotter.reset_camera_clipping_range()
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from tbcad.cad.drafting.sheet import (
 from tbcad.cad.formats.entities import Entity, Layer, Line, Text
 from tbcad.cad.formats.glb import ColouredMesh
 from tbcad.cad.formats.pdf import drawable, text_width, write_pages
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.prototype.assembly_steps.instructions import Instructions, hours_text, instructions
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step
@@ -59,22 +60,27 @@ class Block:
     subject: str = ""  # of a new sheet, and of those that follow
 
 
-def write_book(folder: Path, meshes: Sequence[ColouredMesh], design: str) -> None:
+def write_book(
+    folder: Path, meshes: Sequence[ColouredMesh], design: str, printer: PrinterSpec
+) -> None:
     """Write assembly.pdf into a folder with the lists and the record of a prototype.
 
     meshes: of all bodies, in their places. InputError: as `assembly_steps`.
     """
     machine = read_machine(folder)
     bodies = {one.name: trimesh.Trimesh(one.mesh.vertices, one.mesh.triangles) for one in meshes}
-    pages = book(machine, bodies, design)
+    pages = book(machine, bodies, design, printer)
     write_pages(folder / NAME, f"{design}: assembly", PAPER, pages)
 
 
 def book(
-    machine: AssembledMachine, bodies: dict[str, trimesh.Trimesh], design: str
+    machine: AssembledMachine,
+    bodies: dict[str, trimesh.Trimesh],
+    design: str,
+    printer: PrinterSpec,
 ) -> list[list[Entity]]:
     """The sheets, their entities in mm from the lower left corner."""
-    told = instructions(machine)
+    told = instructions(machine, printer)
     blocks = [
         *_front(told),
         *_parts(machine, told),
@@ -131,6 +137,8 @@ def _front(told: Instructions) -> Iterator[Block]:
     total = ("", "all", hours_text(sum(told.minutes.values())))
     yield from _section("Times", map(_paragraph, told.times))
     yield from _table((11.0, 131.0, 30.0), ("no.", "subassembly", "work"), [*rows, total])
+    yield from _section("Printing", ())
+    yield from _table((36.0, 136.0), ("setting", "value"), told.printing)
 
 
 def _parts(machine: AssembledMachine, told: Instructions) -> Iterator[Block]:

@@ -19,7 +19,6 @@ LENGTHS |= {"dowels": "length_mm", "magnets": "height_mm", "leds": "height_mm"}
 ALONG_AXIS = {
     **{"bearing_front": 35.0, "bearing_rear": -35.0, "shaft": -70.0, "collar": -110.0},
     **{"spacer": 20.0, "brake": -30.0},
-    **{"spacer": 20.0, "brake": -30.0},
     **{"pinion": 45.0, "camera_gauge": 40.0},
 }
 UP = {"stage_crown": 40.0, "stage_disc": 70.0}

@@ -3,7 +3,6 @@
 Times are sums of minutes for each thing that is done; none is measured, and the words say so.
 """
 
-import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
@@ -13,13 +12,20 @@ from importlib.resources import files
 from typing import Any
 
 from tbcad.cad.formats.checked_files import Row
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.prototype.assembly_steps.machine import OWN, AssembledMachine
 from tbcad.prototype.assembly_steps.steps import SCREWED, Step, Use, assembly_steps
 from tbcad.prototype.files.bom import totals
+from tbcad.prototype.purchased.parts import without_example
+from tbcad.prototype.slicing import print_settings
 
-EXAMPLE = re.compile(r" \(such as [^)]*\)")  # a maker's number, which nothing depends on
 ROUND_MIN = 5.0  # that times are rounded to
-MIN_PER_H = 60.0
+MIN_PER_H, G_PER_KG = 60.0, 1000.0
+RESIN = "resin"  # of caps that are polished by hand
+SETTINGS = (
+    *("layer_height", "extrusion_width", "perimeters", "top_solid_layers"),
+    "support_material_threshold",
+)
 
 
 @dataclass(frozen=True)
@@ -28,6 +34,7 @@ class Instructions:
 
     about: tuple[str, ...]  # paragraphs at the beginning
     tools: tuple[str, ...]  # of the whole assembly
+    printing: tuple[tuple[str, str], ...]  # settings of the slicer, and what they are for
     steps: tuple[Step, ...]  # each of a subassembly, in order
     designations: dict[int, str]  # of each part of the list, without a supplier's number
     minutes: dict[str, float]  # of work, by keys of steps
@@ -44,32 +51,42 @@ class Instructions:
         ]
 
 
-def instructions(machine: AssembledMachine) -> Instructions:
+def instructions(machine: AssembledMachine, printer: PrinterSpec) -> Instructions:
     """The instructions for a prototype. InputError: as `assembly_steps`."""
     words, steps = _words(), assembly_steps(machine)
     kinds = {machine.kind(part) for part in machine.bill.items}
     done = {what for step in steps for what in _done(machine, step)}
     each = ", ".join(f"{what} {one:g}" for what, one in words["minutes"].items() if what in done)
-    hours = totals(machine.bill.rows)["print_hours"]
+    sums = totals(machine.bill.rows)
     return Instructions(
         about=tuple(words["about"]),
         tools=(
             *words["tools"],
             *(tool for kind, tool in words["tools_of_kinds"].items() if kind in kinds),
         ),
+        printing=tuple(_printing(printer, sums)),
         steps=steps,
         designations={int(row["item"] or 0): designation(row) for row in machine.bill.rows},
         minutes={step.key: work_minutes(machine, step) for step in steps},
-        times=tuple(text.format(print_hours=hours, minutes=each) for text in words["times"]),
+        times=tuple(text.format(**sums, minutes=each) for text in words["times"]),
         step_tools={step.key: tuple(dict.fromkeys(_tools(machine, step))) for step in steps},
         tested=tuple((what, result) for what, result in words["tested"]),
         not_drawn=tuple(_not_drawn(machine, steps)),
     )
 
 
+def _printing(printer: PrinterSpec, sums: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """What a slicer is to be told, by the settings that filament and hours are estimated for."""
+    use = print_settings(printer.nozzle_mm)
+    told = {key: use[key] for key in SETTINGS} | dict(printer) | sums
+    bed = " x ".join(f"{side:g}" for side in printer.bed_mm)
+    for what, text in _words()["printing"]:
+        yield what, text.format(**told, bed=bed, kg=sums["filament_g"] / G_PER_KG)
+
+
 def designation(row: Row) -> str:
     """What a part of the list is, by standards and sizes: without the number of a supplier."""
-    return EXAMPLE.sub("", str(row["what"]))
+    return without_example(str(row["what"]))
 
 
 def work_minutes(machine: AssembledMachine, step: Step) -> float:
@@ -106,8 +123,9 @@ def _work(machine: AssembledMachine, use: Use) -> str:
         return kind
     if not use.bodies or not machine.is_printed(use.bodies[0]):
         return "balls"
-    caps = {one.name for one in machine.record.with_role("cap")}
-    return "caps" if use.bodies[0] in caps else "printed parts"
+    caps = {f"cap_{one.ball}": one.material == RESIN for one in machine.record.caps}
+    by_hand = caps.get(use.bodies[0])
+    return "printed parts" if by_hand is None else "caps" if by_hand else "turned caps"
 
 
 def _tools(machine: AssembledMachine, step: Step) -> Iterator[str]:
@@ -120,7 +138,8 @@ def _tools(machine: AssembledMachine, step: Step) -> Iterator[str]:
             yield f"hexagon key {size}" if size else "screwdriver"
     for use in step.parts:
         part, kind = machine.listed(use.part), machine.kind(use.part)
-        if tool := words["step_tools"].get(kind):
+        tool = words["step_tools"].get(kind)
+        if tool := tool.get(step.key) if isinstance(tool, dict) else tool:
             width = f"{part['width_mm']:g}" if part and kind == "nuts" else ""
             yield from tool.format(nut=width).split(", ")
 

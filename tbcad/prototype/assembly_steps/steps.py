@@ -219,6 +219,8 @@ def tightening(machine: AssembledMachine, screw: FastenerRecord) -> tuple[str, s
     on_axis = _kinds_on_axis(machine, screw, thread)
     in_hole = machine.is_printed(last) and not on_axis
     held_by = "the printed hole" if in_hole else f"thread of the {last}"
+    if part and part.kind == "setscrews" and in_hole and not machine.is_printed(screw.through[0]):
+        held_by = f"thread of the {screw.through[0]}"  # it presses on the last
     held_by = next((name for kind, name in HOLDS.items() if kind in on_axis), held_by)
     if part is None or thread < SMALLEST_THREAD_MM or thread == TRIPOD_MM or in_hole:
         return HAND, held_by

@@ -23,6 +23,7 @@ from tbcad.prototype.assembly_steps.machine import (
     Words,
     planned,
     told_words,
+    when,
 )
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import magnet_part, seat_magnets
@@ -242,7 +243,7 @@ def _forces(base: BaseLayout, prototype: PrototypeLayout, k: int) -> tuple[float
     return float(glue_force(seats.pocket[k])), None
 
 
-@planned("Make the caps", "cap_*")
+@planned("Caps", "cap_*")
 def caps_step(machine: AssembledMachine) -> Words:
     """Mirrors that are made."""
     caps = machine.record.caps
@@ -253,8 +254,15 @@ def caps_step(machine: AssembledMachine) -> Words:
         ask="asks" if len(caps) == 1 else "ask",
         printed=caps[0].material == MATERIALS["printed"],
         turned=caps[0].material == MATERIALS["turned"],
-        caps=[{"cap": one} for one in caps],
+        caps=[{"cap": one, "magnet": _magnet_of(machine, one)} for one in caps],
     )
+
+
+def _magnet_of(machine: AssembledMachine, cap: CapRecord) -> str:
+    """What its spigot has for a magnet, as text; empty where it has none."""
+    body = (f"cap_{cap.ball}",)
+    held = [machine.ref(one.part) for one in machine.fasteners if one.through == body]
+    return when(held, f" {', '.join(held)} in it;")
 
 
 @planned("Balls into their seats", "ball_*", near=("carrier",))

@@ -143,9 +143,9 @@ def with_pads(
 def _between_legs(seats: Seats, spec: BaseSpec, k: int) -> Iterator[TopoDS_Shape]:
     """What is cut out between two legs each, outside the core."""
     core, boss = core_radius(seats, spec, k), float(seats.boss[k])
-    apex = _half_leg(seats, spec, k) / np.sin(np.pi / 3)
-    if max(core, apex) >= boss:
+    if core >= boss:
         return
+    apex = _between_mm(seats, spec, k)
     low, top = float(seats.front[k]) - BEYOND_MM, core_top(seats, spec, k)
     end = float(seats.back[k]) + BEYOND_MM
     length, inner = end - low, cylinder(top * UP, UP, core, end - top)
@@ -167,9 +167,18 @@ def _half_leg(seats: Seats, spec: BaseSpec, k: int) -> float:
     return float(seats.pad[k]) + spec.cup_wall_mm
 
 
+def _between_mm(seats: Seats, spec: BaseSpec, k: int) -> float:
+    """Distance from the axis at which the sides of two legs meet, mm."""
+    return _half_leg(seats, spec, k) / float(np.sin(np.pi / 3))
+
+
 def core_radius(seats: Seats, spec: BaseSpec, k: int) -> float:
-    """Radius of what stays whole round the pocket, mm; no less than the boss where no leg is."""
-    return float(wall_section(seats, spec, k)[-2, 1]) + BEYOND_FOOT_MM
+    """Radius of what stays whole round the pocket, mm; no less than the boss where no leg is.
+
+    The cup is as wide as where two legs meet before the core begins: else a knife edge is between.
+    """
+    foot = float(wall_section(seats, spec, k)[-2, 1]) + BEYOND_FOOT_MM
+    return max(foot, _between_mm(seats, spec, k) + RIM_MM)
 
 
 def core_top(seats: Seats, spec: BaseSpec, k: int) -> float:

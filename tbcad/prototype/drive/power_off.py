@@ -18,7 +18,7 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.base.hub import PIN_MM, PIN_OUT_MM, ZERO_DISC_MM
 from tbcad.prototype.drive.balance import BaseBalance
 from tbcad.prototype.drive.drive import SELF_LOCKING, Drive
-from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
+from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind, without_example
 from tbcad.records.prototype_drive import PowerOff
 
 FINGER_N, FINGER_N_MM = 140.0, 75.0
@@ -41,7 +41,7 @@ def with_brake(
     if energy <= FALL_LIMIT_J:
         return drive
     for brake in sorted(of_kind(parts, "brakes"), key=lambda one: one["torque_nmm"]):
-        braked = replace(drive, brake=brake)
+        braked = replace(drive, brake=brake, motor=_with_two_ends(drive.motor))
         if fall_energy(braked, balance, travel) <= FALL_LIMIT_J:
             return braked
     raise SpecError(
@@ -50,6 +50,12 @@ def with_brake(
         f"{drive.name}: use prototype.base.drive nema17-belt or stage-60, or make "
         "prototype.largest_ball_mm smaller"
     )
+
+
+def _with_two_ends(motor: PurchasedPart) -> PurchasedPart:
+    """A motor as it is ordered for a brake: examples of the list have one end only."""
+    ends = f"with a shaft of {motor['shaft_mm']:g} mm at both ends"
+    return replace(motor, what=f"{without_example(motor.what)} {ends}")
 
 
 def fall_energy(drive: Drive, balance: BaseBalance, travel: tuple[float, float]) -> float:

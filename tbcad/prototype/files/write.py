@@ -61,6 +61,7 @@ COLOURS: dict[Role, Colour] = {
     "frame": (0.85, 0.50, 0.30, 1.0),
     "tool": (0.85, 0.50, 0.30, 1.0),
 }
+WIRING_DECIMALS = 3
 
 
 def export_prototype(
@@ -107,7 +108,7 @@ def export_prototype(
     steps = mounting_record(AssembledMachine(listed, record, (), sizes, built.parts))
     record.model_copy(update={"assembly_steps": steps}).write(folder / NAME)
     tools = coloured_meshes([_printed("tools", built, ("tool",))])  # on the bed, of no assembly
-    submit(write_book, folder, [*meshes, *tools], title)
+    submit(write_book, folder, [*meshes, *tools], title, spec.printer)
     radius = spec.optics.capture_diameter_mm / 2
     write_camera_sheet(folder, design.arrays[0], radius, built.rig_light)
     return spec
@@ -137,9 +138,17 @@ def _bill(built: PrototypeModel, estimates: list[tuple[float, float]], prices: P
     return [*rows, *bom.tool_rows(len(rows) + 1, prices)]
 
 
+def _rounded(row: Row) -> Row:
+    """A line of the wiring with figures as they are read: to a thousandth."""
+    return {
+        key: round(value, WIRING_DECIMALS) if isinstance(value, float) else value
+        for key, value in row.items()
+    }
+
+
 def _write_tables(built: PrototypeModel, folder: Path) -> None:
     layout, motion = built.layout, built.spec.prototype.motion
-    wires = [controllers.wired(row, motion) for row in built.frame.of(Wiring).rows]
+    wires = [_rounded(controllers.wired(row, motion)) for row in built.frame.of(Wiring).rows]
     loads = drive_loads(built.drive, base_torques(built.balance, layout.stops.range, motion))
     for name, columns, rows in (
         (BALLS_FILE, tables.BALL_COLUMNS, tables.ball_rows(layout)),

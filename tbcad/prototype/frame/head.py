@@ -4,6 +4,7 @@ It is a plate across the axis with a tube for the bearings, held by a flange on 
 webs between plate and flange leave space for tube and motor.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -92,7 +93,8 @@ def bearing_head(site: Site, _: FrameLayout) -> BearingHead:
     body = box((plate.back, plate.low, -plate.half_width), corner, base.frame)
     added = [body, *_flange(site, plate, (face, low, top))]
     removed = _motor_holes(site, plate)
-    removed += _zero_holes(base, plate)
+    places = bracket_screws() if site.spec.prototype.motion.homes else ()
+    removed += _zero_holes(base, plate, places)
     sides = (-spec.uprights_mm / 2, spec.uprights_mm / 2)
     heights = (low + SCREW_EDGE_MM, top - SCREW_EDGE_MM)
     screws = [np.array([face, y, z]) @ axes for z in heights for y in sides]
@@ -124,7 +126,7 @@ def bearing_head(site: Site, _: FrameLayout) -> BearingHead:
                     -base.frame[2],
                     (component.name,),
                 )
-                for out in bracket_screws()
+                for out in places
             ),
         ),
         listed=shaft_parts.listed if shaft_parts else {},
@@ -199,8 +201,8 @@ def _flange(site: Site, plate: HeadPlate, at: tuple[float, float, float]) -> lis
     return [flange, *webs(corners, WEB_MM, spec.web_mm, axes)]
 
 
-def _zero_holes(base: BaseLayout, plate: HeadPlate) -> list[Primitive]:
-    """Hole of the zero pin and mark beside it; inserts for the bracket of the switch."""
+def _zero_holes(base: BaseLayout, plate: HeadPlate, places: Iterable[float]) -> list[Primitive]:
+    """Hole of the zero pin and mark beside it; inserts for the bracket of the switch, out."""
     spec, through = base.spec, (PLATE_MM + 2 * THROUGH_MM) * base.frame[0]
     pin = base.point(plate.back - THROUGH_MM, PIN_OUT_MM)
     mark = plate.front - MARK_DEPTH_MM, PIN_OUT_MM, -MARK_MM / 2
@@ -208,7 +210,7 @@ def _zero_holes(base: BaseLayout, plate: HeadPlate) -> list[Primitive]:
     holes: list[Primitive] = [cylinder_between(pin, pin + through, PIN_HOLE_MM / 2)]
     holes.append(box(mark, end, base.frame))
     middle, deep = plate.front - PLATE_MM / 2, plate.half_width - spec.insert_depth_mm
-    for out in bracket_screws():
+    for out in places:
         inner = base.point(middle, out, deep)
         outer = base.point(middle, out, plate.half_width + THROUGH_MM)
         holes.append(cylinder_between(inner, outer, spec.insert_hole_mm / 2))
@@ -263,7 +265,7 @@ def head_step(machine: AssembledMachine) -> Words:
     seat = "Press a bearing into either side of the head, until it sits on its shoulder."
     turns = "The shaft slides through both bearings by hand and turns without a rough spot."
     does = [
-        "Press the inserts into the head's side.",
+        when(machine.has("home_bracket"), "Press the inserts into the head's side."),
         when(bearings, seat),
         "Screw the head on the uprights with the T-nuts, its upper edge flush with their ends.",
     ]

@@ -163,7 +163,7 @@ def shop_step(machine: AssembledMachine) -> Words:
     """Plate and uprights as drawn; what must be matt black is blackened before it is mounted."""
     stock = machine.record.frame_stock
     plate, upright = map(machine.record.drawing_of, (stock.plate, stock.upright))
-    finished = (one.name for one in machine.record.bought if one.finish)
+    finished = (one.name for one in machine.record.bought if one.finish and one.part)
     kinds = dict.fromkeys(SIDE_OR_NUMBER.sub("", name).replace("_", " ") for name in finished)
     black = ", ".join(kinds)
     return told_words(

@@ -40,6 +40,7 @@ MAX_PRICE = 1e6
 CURRENCY = re.compile("[A-Z]{3}")  # ISO 4217
 DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])(-(0[1-9]|[12]\d|3[01]))?")  # ISO 8601
 CENTS = 2
+EXAMPLE = re.compile(r" \(such as [^)]*\)")  # a maker's number, which nothing depends on
 WEIGHED_DIGITS = 2  # a price by mass is an estimate whatever the list says
 
 
@@ -58,6 +59,11 @@ class PurchasedPart:
     def __getitem__(self, size: str) -> float:
         """One of the sizes, by the name of its column."""
         return self.sizes[sizes_of(self.kind).index(size)]
+
+
+def without_example(what: str) -> str:
+    """A description by standards and sizes, without the number of a supplier."""
+    return EXAMPLE.sub("", what)
 
 
 Parts = dict[str, PurchasedPart]

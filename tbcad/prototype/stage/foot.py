@@ -81,6 +81,7 @@ def stage_step(machine: AssembledMachine) -> Words:
         count=len(leds),
         wired=when(leds, "Wires through the post. "),
         turned=when(leds, ", turned so that the LEDs stand as the checks say"),
+        braked=when(machine.has("brake"), " (with 24 V on the brake)"),
         plugged=when(leds, " A plug on the wires lets it be taken out."),
     )
 

@@ -15,6 +15,7 @@ from tbcad.cad.formats.entities import Entity, Layer, Line, Polyline, Text
 from tbcad.cad.formats.glb import ColouredMesh
 from tbcad.cad.formats.pdf import drawable, text_width
 from tbcad.cad.kernel.mesh import Mesh
+from tbcad.core.spec.design import PrinterSpec
 from tbcad.prototype.assembly_steps.book import NAME, PAPER, TITLE, book, write_book
 from tbcad.prototype.assembly_steps.instructions import (
     _words,
@@ -59,7 +60,7 @@ def bodies(machine: AssembledMachine) -> Bodies:
 
 @pytest.fixture
 def sheets(machine: AssembledMachine, bodies: Bodies) -> list[list[Entity]]:
-    return book(machine, bodies, "some, n = 4")
+    return book(machine, bodies, "some, n = 4", PrinterSpec())
 
 
 def texts(entities: list[Entity]) -> list[Text]:
@@ -67,10 +68,17 @@ def texts(entities: list[Entity]) -> list[Text]:
 
 
 def test_all_words_are_there(machine: AssembledMachine, sheets: list[list[Entity]]) -> None:
-    told = instructions(machine)
+    told = instructions(machine, PrinterSpec())
     shown = " ".join(one.text for sheet in sheets for one in texts(sheet))
     steps = [text for step in told.steps for text in (*step.does, *step.fits, *step.checks)]
-    for text in (*told.about, *told.tools, *told.times, *told.not_drawn, *steps):
+    for text in (
+        *told.about,
+        *told.tools,
+        *told.times,
+        *told.not_drawn,
+        *sum(told.printing, ()),
+        *steps,
+    ):
         assert " ".join(text.split()) in shown
         assert drawable(text) == text  # no question marks for what Helvetica lacks
     for step in told.steps:
@@ -117,9 +125,9 @@ def test_the_same_bytes_which_the_verification_takes(folder: Path, bodies: Bodie
         ColouredMesh(name, "g", Mesh(np.array(one.vertices), one.faces), (1.0, 1.0, 1.0, 1.0))
         for name, one in bodies.items()
     ]
-    write_book(folder, meshes, "some, n = 4")
+    write_book(folder, meshes, "some, n = 4", PrinterSpec())
     data = (folder / NAME).read_bytes()
-    write_book(folder, meshes, "some, n = 4")
+    write_book(folder, meshes, "some, n = 4", PrinterSpec())
     assert (folder / NAME).read_bytes() == data
     assert sheet_faults(read(folder, NAME, 10**7)) == []
     broken = {
@@ -144,7 +152,7 @@ def test_no_designation_has_a_makers_number() -> None:
 
 
 def test_times_are_sums(machine: AssembledMachine) -> None:
-    told = instructions(machine)
+    told = instructions(machine, PrinterSpec())
     motor = next(step for step in told.steps if step.key == "motor")
     # Motor 3, pinion 2, a screw 0.8; 1.5 for each instruction and 1 for each check.
     expected = 3 + 2 + 0.8 + 1.5 * len(motor.does) + len(motor.checks)

@@ -12,6 +12,8 @@ import pytest
 
 from tbcad.app.cli import run
 from tbcad.cad.formats.checked_files import Row, write_table
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.core.mirrors.record import write_record
 from tbcad.errors import InputError
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps, mounting_record, record
@@ -203,6 +205,54 @@ def test_torques_follow_what_yields_first(tmp_path: Path) -> None:
         assert limit - 0.05 < by_screw[screw] <= limit
 
 
+def test_a_set_screw_is_in_the_thread_of_what_is_not_printed(tmp_path: Path) -> None:
+    """It goes through the tube's tapped hole and presses on the plastic behind."""
+    design = belt_design()
+    design["fasteners"].append(fastener("SET-M3x4", 1, "stage_post", "bearing_head", x=80.0))
+    steps = assembly_steps(read_machine(write(tmp_path, design, LOOSE)))
+    (line,) = [fit for step in steps for fit in step.fits if "SET-M3x4" in fit]
+    assert line.endswith("hand tight, in thread of the stage post")
+
+
+def test_a_braked_base_is_turned_with_voltage_on_the_brake(tmp_path: Path) -> None:
+    """Its spring holds the motor from the step on that mounts it."""
+    plain, braked = belt_design(), belt_design()
+    braked["bought"].append(bought("brake", "BRAKE-17-0.4"))
+    for design in (plain, braked):
+        design["bought"].append(bought("home_switch", "SWITCH-ROLLER"))
+    for design, told in ((plain, False), (braked, True)):
+        folder = tmp_path / str(told)
+        folder.mkdir()
+        steps = assembly_steps(read_machine(write(folder, design, LOOSE)))
+        texts = {step.key: " ".join((*step.does, *step.checks)) for step in steps}
+        assert all(("24 V" in texts[key]) == told for key in ("motor", "homing", "stage"))
+
+
+def test_without_a_switch_the_pin_alone_shows_angle_zero(tmp_path: Path) -> None:
+    """GRBL 1.1 does not home."""
+    for homes in (True, False):
+        design, folder = belt_design(), tmp_path / str(homes)
+        design["bought"] += [bought("home_switch", "SWITCH-ROLLER")] * homes
+        folder.mkdir()
+        steps = assembly_steps(read_machine(write(folder, design, LOOSE | {"ROD-4x40": 1})))
+        homing = of(steps, "homing")
+        assert "ROD-4x40" in {use.part for use in homing.parts}
+        assert ("Screw the switch" in homing.does[0]) == homes
+        assert ("clicks the switch" in " ".join(homing.checks)) == homes
+
+
+def test_the_wiring_names_terminals_of_the_board(tmp_path: Path) -> None:
+    """Of each firmware that the board is named for, and its driver's place."""
+    for firmware, words in (("grblhal", "FAN0 to FAN4"), ("klipper", "step_pin PF13")):
+        design, folder = belt_design(), tmp_path / firmware
+        design["controller"] |= {"firmware": firmware, "board": "OCTOPUS-PRO-1.1"}
+        folder.mkdir()
+        steps = assembly_steps(read_machine(write(folder, design, LOOSE | {"DRIVER-2A": 1})))
+        does = " ".join(of(steps, "wiring").does)
+        assert words in does
+        assert "Driver DRIVER-2A" in does
+
+
 def test_t_nuts_are_in_the_slots_that_their_screws_are_at(tmp_path: Path) -> None:
     """Screws from the front go against the axis, which leans from the uprights to the camera."""
     design, uprights = belt_design(), ("upright_left", "upright_right")
@@ -233,8 +283,12 @@ def test_what_does_not_add_up_is_refused(
 
 
 def test_json_and_page_have_the_same_steps(
-    machine: AssembledMachine, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    machine: AssembledMachine,
+    small_design: MirrorDesign,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    write_record(tmp_path, small_design, shells=False)
     assert run(["assembly", str(tmp_path), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)["steps"]
     assert printed == json.loads(json.dumps(record(assembly_steps(machine))))
@@ -242,5 +296,6 @@ def test_json_and_page_have_the_same_steps(
     assert run(["assembly", str(tmp_path), "--out", str(out), "--no-pictures"]) == 0
     text = (out / "assembly.html").read_text()
     assert all(f'id="{step.key}"' in text for step in assembly_steps(machine))
+    assert "<td>0.6 mm, layers of 0.3 mm" in text
     assert run(["assembly", str(tmp_path), "--out", str(out), "--no-pictures"]) == 2
     assert "--force" in capsys.readouterr().err

@@ -24,6 +24,7 @@ from tbcad.prototype.base.coupon_seats import (
     KEEL_MM,
     SeatPose,
     core_radius,
+    core_top,
     expected_downs,
     height,
     seat_body,
@@ -231,6 +232,15 @@ class TestCoupon:
             middle = deep.mean() * -seats.local_normals[k] * [-1, -1, 1]
             between = norm(middle[:, :2]).min() > core_radius(seats, spec, k)
             assert solid.contains(middle @ pose.axes).all() != between
+
+    def test_the_cup_ends_legs_before_the_core(self, base: BaseLayout) -> None:
+        """Where legs met just outside the core, a sliver of 0.03 mm was left (n = 24)."""
+        seats, spec = coupon_seats(base, pose_of(base)), base.spec
+        for k in range(len(seats)):
+            legs = (seats.pad[k] + spec.cup_wall_mm) / np.sin(np.pi / 3)
+            core, top = core_radius(seats, spec, k), core_top(seats, spec, k)
+            cup = np.sqrt(max(seats.cup[k] ** 2 - top**2, 0.0))
+            assert core >= seats.boss[k] or (core > legs + 1 and cup > legs - 1e-9)
 
     def test_every_size_has_pads_at_every_offset(
         self, base: BaseLayout, plates: list[PlacedSolid]

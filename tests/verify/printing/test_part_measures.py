@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import manifold3d
 import numpy as np
 import pytest
@@ -93,6 +95,15 @@ def test_the_web_between_two_grooves() -> None:
     outline = [(-10, -5), (-4, -5), (0, -0.4), (4, -5), (10, -5)]
     outline += [(-x, -z) for x, z in outline]
     assert shape(prism(outline, 30)).walls.minimum == pytest.approx(0.8, abs=COARSE)
+
+
+@pytest.mark.parametrize(("degrees", "least"), [(20, 3.0), (29, 3.0), (31, 0.5), (60, 0.5)])
+def test_a_slit_is_no_groove(degrees: float, least: float) -> None:
+    """A V in a bar of 5 mm down to 0.5 mm; below 30 degrees the bar beside it is what counts."""
+    half = 4.5 * math.tan(math.radians(degrees / 2))
+    outline = [(-6, 0), (6, 0), (6, 5), (half, 5), (0, 0.5), (-half, 5), (-6, 5)]
+    thinnest = shape(prism(outline, 30)).walls.minimum
+    assert thinnest == pytest.approx(least, abs=COARSE) if least < 1 else thinnest > least
 
 
 def test_slivers_do_not_see_their_neighbours() -> None:

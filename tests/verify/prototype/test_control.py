@@ -17,6 +17,7 @@ from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.control import homing_checks, program_checks
 from tbcad_verify.prototype.control.gcode_machine import run_program
 from tbcad_verify.record.export import read_export
+from tbcad_verify.report.checks import Unknown
 
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.drive.balance import HomeAngles
@@ -58,10 +59,10 @@ def context(synthetic_prototype: Path) -> PrototypeContext:
     return PrototypeContext(export, record.model_copy(update=texts))
 
 
-def for_klipper(context: PrototypeContext) -> PrototypeContext:
-    """The same design with Klipper."""
+def with_controller(context: PrototypeContext, controller: str = "klipper") -> PrototypeContext:
+    """The same design with Klipper, or another controller."""
     spec = context.export.spec
-    motion = spec.prototype.motion.model_copy(update={"controller": "klipper"})
+    motion = spec.prototype.motion.model_copy(update={"controller": controller})
     prototype = spec.prototype.model_copy(update={"motion": motion})
     export = replace(context.export, spec=spec.model_copy(update={"prototype": prototype}))
     return replace(context, export=export)
@@ -102,6 +103,13 @@ def test_a_photograph_knows_when_it_is_taken() -> None:
     assert (one.released, one.waited, one.settled) == (math.inf, math.inf, 0)
 
 
+def test_only_a_controller_that_homes_must_have_a_switch(context: PrototypeContext) -> None:
+    assert [*homing_checks._switch(with_controller(context, "grbl"), {})] == []
+    for controller in ("klipper", "grblhal"):
+        with pytest.raises(Unknown, match="no home_switch"):
+            list(homing_checks._switch(with_controller(context, controller), {}))
+
+
 def test_another_axis_is_the_designs(context: PrototypeContext) -> None:
     spec = context.export.spec
     motion = spec.prototype.motion.model_copy(update={"axis": "A"})
@@ -113,7 +121,7 @@ def test_another_axis_is_the_designs(context: PrototypeContext) -> None:
 
 
 def test_the_program_of_the_chosen_controller_is_run(context: PrototypeContext) -> None:
-    chosen = for_klipper(context)
+    chosen = with_controller(context)
     assert [*program_checks.program_faults(chosen)] == []
     assert [*homing_checks.settings_faults(chosen, DRIVE.ratio)] == []
     assert faults(chosen, "program", "G1 X5\n") == ""  # is of another controller

@@ -33,6 +33,9 @@ SQUARE_COS = math.cos(math.radians(30))
 # side at 45. No edge is near, so thickness does not tend to zero there.
 GROOVE_COS = math.cos(math.radians(50))
 GROOVE_RAD = 0.1  # a concave edge beyond this is the bottom of a groove
+# A groove of less than 30 degrees is a slit that prints fill at its bottom, for 0.4 mm have no room
+# in the lowest 0.75 mm: what is left below is thicker than a ray from where the sides meet finds.
+SLIT_RAD = math.pi - math.radians(30)
 # Facets whose normal rounding may have tilted more than this are neither start nor end of a ray:
 # a ray from a tilted sliver hits the sliver's own neighbours.
 SOUND_RAD = 0.05
@@ -216,7 +219,8 @@ def _on_lattice(mesh: Mesh, facets: Ints, lattice: Floats) -> ThicknessRays:
 
 def _from_grooves(mesh: Mesh, edges: Edges, sound: Bools, step: float) -> Iterator[ThicknessRays]:
     """From the bottoms of grooves: rays from facets beside one miss the thin wall below it."""
-    half = edges.half[edges.angle < -(GROOVE_RAD + edges.noise)]
+    bend = -edges.angle
+    half = edges.half[(bend > GROOVE_RAD + edges.noise) & (bend < SLIT_RAD)]
     half = half[sound[half // 3] & sound[mesh.twin[half] // 3]]
     start, edge = half_edge_vectors(mesh, half)
     size = _steps(norm(edge), step)

@@ -194,11 +194,13 @@ def assembly(
     from tbcad.prototype.assembly_steps.instructions import instructions
     from tbcad.prototype.assembly_steps.machine import read_machine
     from tbcad.prototype.assembly_steps.steps import record
+    from tbcad.records.design import NAME as DESIGN
+    from tbcad.records.design import DesignRecord
     from tbcad.report.assembly_page import write_page
 
     check_is_folder(folder)
     machine = read_machine(folder)
-    told = instructions(machine)
+    told = instructions(machine, DesignRecord.read(folder / DESIGN).spec.printer)
     steps = told.steps
     if json:
         print_json({"steps": record(steps)})

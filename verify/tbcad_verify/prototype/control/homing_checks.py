@@ -123,7 +123,13 @@ def _polar(context: PrototypeContext, points: Floats) -> Floats:
 
 
 def _switch(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Iterator[str]:
-    """The base angle at which the tab's arc begins at the roller, and what the tab presses then."""
+    """The base angle at which the tab's arc begins at the roller, and what the tab presses then.
+
+    GRBL 1.1 does not home, and needs none.
+    """
+    grbl = context.export.spec.prototype.motion.controller == "grbl"
+    if grbl and "home_switch" not in solids:
+        return
     switch = require(solids.get("home_switch"), "the assembly has no home_switch")
     disc = require(solids.get("zero_disc"), "the assembly has no zero_disc")
     rollers = [
