@@ -82,7 +82,7 @@ def planned(options: BuildOptions) -> BuildPlan:
     parts = default_parts(spec) if asked is None else tuple(asked)
     check_lists(spec, parts)
     file = None if isinstance(options.spec, Spec) else options.spec
-    inputs = [*design_files(spec, file), *files_named(options.for_process)]
+    inputs = [*design_files(spec, file), *files_named(options.process)]
     check_replaceable(Path(options.out), "build", options.force, inputs)
     return BuildPlan(spec, parts, process)
 
@@ -110,13 +110,13 @@ def _asked_process(options: BuildOptions) -> Process | None:
     from tbcad.tolerancing.process.process import load_process
 
     if options.wanted_yield is not None:
-        if options.for_process is None:
+        if options.process is None:
             raise InputError(
-                f"--yield {options.wanted_yield:g} is of no use without --for-process: name a "
+                f"--yield {options.wanted_yield:g} is of no use without --process: name a "
                 "process, or leave --yield out"
             )
         check_yield(options.wanted_yield)
-    return None if options.for_process is None else load_process(options.for_process)
+    return None if options.process is None else load_process(options.process)
 
 
 def spec_for_process(plan: BuildPlan, options: BuildOptions) -> Spec:

@@ -126,12 +126,12 @@ def order(options: OrderOptions) -> dict[str, Any]:
     from tbcad.tolerancing.process.process import load_process
 
     check_yield(options.wanted)
-    process = load_process(options.chain)
+    process = load_process(options.process)
     check_replaceable(out, "order", options.force, (exports,))
     from tbcad.drawings.order_sheet import write_sheet
     from tbcad.mirror_limits.order import checked_export, write_order
 
-    export = checked_export(exports, process, options.chain)
+    export = checked_export(exports, process, options.process)
     with replacing(out, "order", options.force, (exports,)) as folder:
         record = write_order(export, process, options, folder)
         options.progress("page")
