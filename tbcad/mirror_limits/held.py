@@ -106,8 +106,8 @@ def chain_of(
     cutter, smallest = process.mandrel_cutter_mm, float(radius.min())
     if cutter is not None and cutter >= smallest:
         raise InputError(
-            f"--process {name}: the mandrel's cutter has a radius of {cutter:g} mm, allowed is less "
-            f"than that of the smallest mirror, {smallest:.3g} mm: name a smaller one"
+            f"--process {name}: the mandrel's cutter has a radius of {cutter:g} mm, allowed is "
+            f"less than that of the smallest mirror, {smallest:.3g} mm: name a smaller one"
         )
     length, kinds = process.warp_um.length_mm, found.each.shape[1]
     each, mandrel, replica = (

@@ -140,7 +140,7 @@ class BuildOptions(Call):
 
 @dataclass(frozen=True)
 class VerificationOptions(Call):
-    """An export, and what else to verify of it."""
+    """A build, and what else to verify of it."""
 
     exports: Exports[AnyPath]
     _: KW_ONLY
@@ -172,14 +172,14 @@ class VerificationOptions(Call):
 
 @dataclass(frozen=True)
 class ReportOptions(Call):
-    """An export, and what its page shows."""
+    """A build, and what its page shows."""
 
     exports: Exports[AnyPath]
     out: Annotated[AnyPath | None, typer.Option("--out", "-o")] = None
     """HTML file to write; by default report.html in the folder."""
     _: KW_ONLY
     capture: Annotated[AnyPath | None, typer.Option(metavar="FOLDER")] = None
-    """Folder written by tbcad capture or merge for this export: shows the photograph in each
+    """Folder written by tbcad capture or merge for this build: shows the photograph in each
     mirror."""
     force: bool = False
     """Replace a file that tbcad did not write, instead of refusing."""
@@ -207,7 +207,7 @@ class OrderOptions(Call):
 
 @dataclass(frozen=True)
 class ToleranceOptions(Call):
-    """An export, a process that makes it, and how its yield is simulated."""
+    """A build, a process that makes it, and how its yield is simulated."""
 
     exports: Exports[AnyPath]
     process: Annotated[str | None, typer.Option(metavar="NAME|FILE")] = None

@@ -42,9 +42,7 @@ def prototype_as_made(export: ExportedDesign) -> ProcessYield:
     """
     spec, plan = export.spec, read_plan(export)
     model = prototype_model(export.reflectors, plan, read_gravity(export, plan))
-    errors = process_errors(
-        load_process(PRINTED_BY), spec.mirrors.coating_um, spec.prototype.caps
-    )
+    errors = process_errors(load_process(PRINTED_BY), spec.mirrors.coating_um, spec.prototype.caps)
     return _yield(CalibratedCase(model, errors, SEED), PRINTED_BY, export.capture_mm)
 
 

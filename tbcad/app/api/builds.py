@@ -226,7 +226,7 @@ def _prototype_as_made(folder: Path) -> ProcessYield | None:
 def as_made(
     exports: Path | str, progress: Progress = silent, detail: Progress = silent
 ) -> AsMade | None:
-    """Simulate a few builds of a build's shells by every built-in process, and of its prototype.
+    """Simulate a few builds of a folder's shells by every built-in process, and of its prototype.
 
     None where its record cannot be read.
     """
@@ -248,9 +248,9 @@ def as_made(
 
 @keywords(ReportOptions)
 def report_page(options: ReportOptions) -> Path:
-    """Write the page that shows an export: one HTML file with its verdict, 3D view and tables.
+    """Write the page that shows a build: one HTML file with its verdict, 3D view and tables.
 
-    InputError: the export or the capture cannot be read, or the file may not be written.
+    InputError: the build or the capture cannot be read, or the file may not be written.
     """
     folder = Path(options.exports)
     file, light_field = (

@@ -74,9 +74,10 @@ class OpticsSpec(Section):
     semi_minor_mm: float = Field(100.0, ge=1, le=MAX_SEMI_MINOR)
     """Semi-minor axis of both ellipsoids, whose foci are the origin and a pinhole. Larger:
     mirrors farther away."""
-    stretch: Annotated[
-        tuple[Stretch, Stretch], BeforeValidator(as_tuple), Entries(("x", "y"))
-    ] = (1.0, 1.0)
+    stretch: Annotated[tuple[Stretch, Stretch], BeforeValidator(as_tuple), Entries(("x", "y"))] = (
+        1.0,
+        1.0,
+    )
     """Directions of the virtual cameras, stretched along x and y and brought back to the unit
     sphere; 1 and 1: those of the geodesic polyhedron, as the paper has them. Above 1: more of them
     near the horizon, fewer near the zenith, where mirrors have fewest pixels."""

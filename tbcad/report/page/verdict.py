@@ -62,7 +62,7 @@ class Verdict(Record):
 
 
 def read_verdict(folder: Path) -> Verdict | None:
-    """The verification of an export; None if it was not verified.
+    """The verification of a build; None if it was not verified.
 
     InputError: verify.json is damaged.
     """
@@ -84,9 +84,7 @@ def verdict_html(
     yield "</div>"
 
 
-def _files(
-    verdict: Verdict | None, views: int, balls: int, target_mm: float
-) -> Iterator[str]:
+def _files(verdict: Verdict | None, views: int, balls: int, target_mm: float) -> Iterator[str]:
     if verdict is None:
         yield "<div class='card unknown'><h2>Files</h2><p class=big>? not verified</p>"
         yield "<p>Run <code>tbcad verify</code>, then <code>tbcad report</code> again.</p></div>"
@@ -98,8 +96,8 @@ def _files(
     if verdict.passed:
         too = f", and so do the prototype's {balls} balls in place of the mirrors" if balls else ""
         yield (
-            f"<p>As designed {views} virtual cameras see the whole object of {target_mm:g} mm{too}. "
-            f"{len(every)} checks were made on the files themselves.</p>"
+            f"<p>As designed {views} virtual cameras see the whole object of {target_mm:g} mm{too}."
+            f" {len(every)} checks were made on the files themselves.</p>"
         )
     yield from _key_figures(verdict)
     for text, wanted in (("Failed", False), ("Unknown", None)):
@@ -111,7 +109,7 @@ def _files(
 
 
 def _key_figures(verdict: Verdict) -> Iterator[str]:
-    """What decides whether an export is good, each with its limit."""
+    """What decides whether a build is good, each with its limit."""
     named = {check.name: check for check in verdict.checks}
     count = Counter(check.name for check in verdict.checks)
     yield "<table><tbody>"
@@ -150,9 +148,7 @@ def _shells(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
     yield f"<p class=note>Left out: {NOT_MODELLED}.</p></div>"
 
 
-def _prototype(
-    verdict: Verdict | None, as_made: AsMade | None, target_mm: float
-) -> Iterator[str]:
+def _prototype(verdict: Verdict | None, as_made: AsMade | None, target_mm: float) -> Iterator[str]:
     """How many calibrated prototypes are good, and what the printer cannot make."""
     made = as_made.prototype if as_made else None
     parts = [one for one in verdict.checks if one.name == PRINTABLE] if verdict else []
@@ -194,7 +190,7 @@ def _yields(yields: Sequence[ProcessYield]) -> str:
 def checks_html(verdict: Verdict | None) -> Iterator[str]:
     """What did not pass, then all checks by name."""
     if verdict is None:
-        yield "<p>This export is not verified.</p>"
+        yield "<p>This build is not verified.</p>"
         return
     every = (*verdict.checks, *verdict.programs)
     failed = [check for check in every if check.passed is not True]
@@ -236,7 +232,7 @@ def _figure(value: float | None, digits: int = 5) -> str:
 def printing_html(rows: Sequence[PrintRow]) -> Iterator[str]:
     """Parts against processes: can be made, or why not."""
     if not rows:
-        yield "<p>Not known: this export is not verified.</p>"
+        yield "<p>Not known: this build is not verified.</p>"
         return
     printers = {row.profile: row for row in rows}
     cells = {(row.part, row.profile): row for row in rows}

@@ -83,7 +83,6 @@ def test_an_option_is_called_and_takes_the_same_everywhere() -> None:
     assert not spelled & RENAMED_OPTIONS.keys()
 
 
-
 def test_former_names_of_options_are_told_and_still_taken(cli: Command) -> None:
     """For a release."""
     said = cli("build", "--for-process", "cnc", "--yield", "2", code=2).err
