@@ -70,7 +70,7 @@ Yield and the median of the worst cameras are those of the best chain. A row's f
 
 {}
 By every chain: yield, and the median of the worst cameras in mm; of 50 builds where fewer than half
-of them are good. With margins for a chain: `tbcad build NAME --for-process CHAIN`.
+of them are good. With margins for a chain: `tbcad build NAME --process CHAIN`.
 
 {}"""
 

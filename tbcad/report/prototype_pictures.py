@@ -1,4 +1,4 @@
-"""Pictures of the prototype, drawn from an export's record and assembly.
+"""Pictures of the prototype, drawn from a build's record and assembly.
 
 Run as a program, as `shell_pictures`: `python -m tbcad.report.prototype_pictures DIR SUBJECT FILE`.
 """
@@ -33,7 +33,7 @@ GRIDS = {"sides": (2, 2, PANEL_PX), "rig": (1, 1, 1400)}
 
 
 def draw(folder: Path, subject: str, picture: Path) -> None:
-    """Draw one of SUBJECTS of an export with a prototype to a PNG file."""
+    """Draw one of SUBJECTS of a build with a prototype to a PNG file."""
     rows, columns, side = GRIDS.get(subject, (1, 2, PANEL_PX))
     size = (columns * side, rows * side)
     plotter = pyvista.Plotter(

@@ -1,4 +1,4 @@
-"""A prototype as its export describes it: bodies, fasteners, list of parts; steps as planned."""
+"""A prototype as its build describes it: bodies, fasteners, list of parts; steps as planned."""
 
 import tomllib
 from collections.abc import Callable
@@ -78,7 +78,7 @@ class AssembledMachine:
 
 
 def read_machine(folder: Path) -> AssembledMachine:
-    """The prototype of an export.
+    """The prototype of a build.
 
     InputError: a file is missing or broken, or was written by an earlier version.
     """

@@ -86,9 +86,9 @@ def prepared_setup(
     lens: CalibratedLens | None,
     geometry: Geometry = "prototype",
 ) -> Setup:
-    """The machine of an export as frames of a run, of a shell those of one camera, show it.
+    """The machine of a build as frames of a run, of a shell those of one camera, show it.
 
-    InputError: the export has no prototype or LEDs, or another picture's size than the run.
+    InputError: the build has no prototype or LEDs, or another picture's size than the run.
     """
     plan = plan_of(export, geometry, frames)
     machine = (

@@ -62,7 +62,7 @@ class Base:
         }
 
     def check_settings(self, note: Progress, *, send: bool) -> None:
-        """Compare the controller's settings with the export's; send what differs, or refuse."""
+        """Compare the controller's settings with the build's; send what differs, or refuse."""
         differing = self.settings_that_differ()
         if send:
             for number, (was, wanted) in differing.items():

@@ -1,4 +1,4 @@
-"""One camera with its mirrors: of a design, or as an export records it, checked."""
+"""One camera with its mirrors: of a design, or as a build records it, checked."""
 
 from dataclasses import dataclass
 from pathlib import Path
