@@ -18,8 +18,7 @@ from tbcad.output.overview import overview
 DOCS = Path(__file__).parent
 RESULTS, PAGE = DOCS / "every-n.json", DOCS / "every-n.md"
 SUBDIVISIONS = range(2, 41)
-COLUMNS = ("n", "mirrors", "lens", "minimum coverage", "balls + caps", "prototype's coverage")
-COLUMNS += ("pixels kept", "turning", "verdict")
+COLUMNS = ("n", "mirrors", "lens, degrees", "balls+caps", "pixels kept", "turning mass, g")
 BEGIN, END = "<!-- table -->\n", "<!-- end -->\n"
 
 
@@ -53,15 +52,15 @@ def figures_as_built(n: int) -> dict[str, Any]:
 
 
 def page_row(n: str, row: dict[str, Any]) -> str:
-    """A row of the table."""
-    cells = [n, row["mirrors"], f"{row['view_angle_deg']:.0f}°"]
-    cells.append(f"{row['minimum_coverage_mm']:.2f} mm")
+    """A row of the table; of a design that was built and passed n is bold."""
+    cells = [f"**{n}**" if row.get("verdict", "").startswith("PASS") else n, row["mirrors"]]
+    cells.append(f"{row['view_angle_deg']:.0f}")
     if "balls" in row:
-        cells += [f"{row['balls']} + {row['caps']}", f"{row['prototype_coverage_mm']:.2f} mm"]
-        cells += [f"{row['kept_share']:.0%}", f"{row['turning_mass_g']} g"]
+        cells.append(f"{row['balls']}+{row['caps']}")
+        cells += [f"{row['kept_share']:.0%}", f"{row['turning_mass_g']}"]
     else:
-        cells += ["none", "", "", ""]
-    return "| " + " | ".join(map(str, [*cells, row.get("verdict", "")])) + " |"
+        cells += ["none", "", ""]
+    return "| " + " | ".join(map(str, cells)) + " |"
 
 
 def write_page(results: dict[str, dict[str, Any]]) -> None:
