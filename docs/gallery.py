@@ -66,6 +66,7 @@ design the margins that a chain needs.
 
 {}"""
 SHOWN = {
+    "object": "object",
     "mirrors": "mirrors",
     "radius": "radius",
     "camera": "camera",
