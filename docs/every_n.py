@@ -19,6 +19,7 @@ DOCS = Path(__file__).parent
 RESULTS, PAGE = DOCS / "every-n.json", DOCS / "every-n.md"
 SUBDIVISIONS = range(2, 41)
 COLUMNS = ("n", "mirrors", "lens, degrees", "balls+caps", "pixels kept", "turning mass, g")
+EVERY_TO = 13  # beyond, every other n, and those that were built
 BEGIN, END = "<!-- table -->\n", "<!-- end -->\n"
 
 
@@ -66,7 +67,8 @@ def page_row(n: str, row: dict[str, Any]) -> str:
 def write_page(results: dict[str, dict[str, Any]]) -> None:
     """Renew the table in the page."""
     lines = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
-    lines += [page_row(n, results[n]) for n in sorted(results, key=int)]
+    shown = [n for n in results if int(n) <= EVERY_TO or not int(n) % 2 or "verdict" in results[n]]
+    lines += [page_row(n, results[n]) for n in sorted(shown, key=int)]
     head, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
     tail = rest.split(END)[1]
     text = head + BEGIN + "\n" + "\n".join(lines) + "\n\n" + END + tail

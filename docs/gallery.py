@@ -65,14 +65,7 @@ Yield and median of the worst virtual cameras are those of the best chain. Repea
 design the margins that a chain needs.
 
 {}"""
-SHOWN = {
-    "object": "object",
-    "mirrors": "mirrors",
-    "radius": "radius",
-    "camera": "camera",
-    "both shells, by FDM": "both shells printed by FDM",
-    "prototype": "prototype",
-}
+SHOWN = ("object", "mirrors", "radius", "camera", "prototype")
 
 
 def chains(spec: Spec) -> dict[str, list[float]]:
@@ -184,7 +177,7 @@ def can_be_made(results: dict[str, Any]) -> str:
 
 def section(name: str, row: dict[str, Any]) -> str:
     """A design's part of the page."""
-    lines = "\n".join(f"- {told}: {row[key]}" for key, told in SHOWN.items() if key in row)
+    lines = "\n".join(f"- {key}: {row[key]}" for key in SHOWN if key in row)
     return (
         f"## {name}\n\n{purpose(name)} [{name}.toml](../designs/{name}.toml)\n\n"
         f"![Photograph of camera a, and a view](pictures/gallery-{name}.png)\n\n"
