@@ -65,7 +65,7 @@ Yield and median of the worst virtual cameras are those of the best chain. Repea
 design the margins that a chain needs.
 
 {}"""
-SHOWN = ("object", "mirrors", "radius", "camera", "prototype")
+SHOWN = ("object", "mirrors", "camera", "prototype")
 
 
 def chains(spec: Spec) -> dict[str, list[float]]:
