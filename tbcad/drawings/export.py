@@ -1,4 +1,4 @@
-"""What drawings take from an export: files as they were written, or refused."""
+"""Files of a build that drawings need: as they were written, or refused."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -49,7 +49,7 @@ FIGURE_HEAD = ("figure", "limit", "limit of 2 sigma", "chain, 2 sigma", "verdict
 ANY, WORDS = "any", "order_page.toml"
 Holes = list[tuple[str, DrawnHole]]
 Cut = list[tuple[Curve, ...]]
-"""What a view cuts of each solid, in mm of the part."""
+"""Section of each solid in a view, in mm of the part."""
 
 
 def write_sheet(folder: Path, export: Path, record: dict[str, Any], spec: Spec) -> None:
@@ -90,7 +90,7 @@ def order_sheet(export: Path, record: dict[str, Any], spec: Spec) -> Sheet:
 
 
 def _cut(letter: str, shapes: Sequence[Shape], holes: Sequence[Holes]) -> Cut:
-    """What a view cuts: the plane y = 0, or the middle of holes that are round in it."""
+    """Section of a view: the plane y = 0, or the middle of holes that are round in it."""
     cut, axes = [], VIEWS[letter]
     for shape, numbered in zip(shapes, holes, strict=True):
         seen = (hole.cylinder for _, hole in numbered if hole.view == letter)
@@ -129,7 +129,7 @@ def _views(cuts: Sequence[Cut]) -> tuple[list[View], Floats]:
 def _drawn(
     view: View, cut: Cut, letter: str, holes: Sequence[tuple[str, DrawnHole]]
 ) -> Iterator[Entity]:
-    """What a view cuts, the shell hatched, its name, and the numbers of its holes."""
+    """Section of a view, the shell hatched, its name, and the numbers of its holes."""
     shell, *others = (placed(entities, view.origin, view.scale) for entities in cut)
     yield from (*shell, *hatching(shell), *chain.from_iterable(others))
     x, y = np.array(straight(shell)).reshape(-1, 2).min(axis=0).tolist()

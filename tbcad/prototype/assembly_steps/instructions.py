@@ -68,7 +68,7 @@ def instructions(machine: AssembledMachine) -> Instructions:
 
 
 def designation(row: Row) -> str:
-    """What a part of the list is, by standards and sizes: without the number of a supplier."""
+    """Designation of a part by standard and size, without a supplier's number."""
     return EXAMPLE.sub("", str(row["what"]))
 
 
@@ -101,7 +101,7 @@ def hours_text(minutes: float) -> str:
 
 
 def _work(machine: AssembledMachine, use: Use) -> str:
-    """What is done with a part: by its kind, and by its body where it is in no list."""
+    """Work on a part: by its kind, or by its body where it is in no list."""
     if (kind := machine.kind(use.part)) != OWN:
         return kind
     if not use.bodies or not machine.is_printed(use.bodies[0]):

@@ -51,7 +51,7 @@ class Sag:
         )
 
     def unmodelled(self, moved: Floats, freedoms: list[int]) -> Floats:
-        """What is left of displacements (s, k, 3) after calibration, mm, (s, k).
+        """Residual of displacements (s, k, 3) after calibration, mm, (s, k).
 
         Calibration takes out where the balls are on the mean over stops, and for each stop the best
         rigid motion of some freedoms: 0 to 2 are shifts along the axes, 3 to 5 turns about them.

@@ -1,4 +1,4 @@
-"""What the 3D view shows: shells, bodies of prototype.glb, facts of mirrors; arrays as text."""
+"""Contents of the 3D view: shells, bodies of prototype.glb, facts of mirrors; arrays as text."""
 
 import base64
 import zlib

@@ -39,7 +39,7 @@ class PrintRow(Record):
 
 
 class MeasuredMirror(Record):
-    """What was measured of a mirror."""
+    """Measurements of a mirror."""
 
     id: str
     coverage_facet_mm: Finite | None = None
@@ -108,7 +108,7 @@ def _as_designed(
 
 
 def _key_figures(verdict: Verdict) -> Iterator[str]:
-    """What decides whether an export is good, each with its limit."""
+    """Figures that decide the verdict of a build, each with its limit."""
     named = {check.name: check for check in verdict.checks}
     count = Counter(check.name for check in verdict.checks)
     yield "<table><tbody>"
@@ -154,7 +154,7 @@ def _as_made(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
 
 
 def checks_html(verdict: Verdict | None) -> Iterator[str]:
-    """What did not pass, then all checks by name."""
+    """Failed checks, then all checks by name."""
     if verdict is None:
         yield "<p>This export is not verified.</p>"
         return

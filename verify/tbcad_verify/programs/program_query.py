@@ -1,4 +1,4 @@
-"""What one program is asked about one kind of file, the sandbox that it runs in, and its answers.
+"""Questions to one program about one kind of file, its sandbox, and its answers.
 
 What a program does not answer clearly is unknown.
 """

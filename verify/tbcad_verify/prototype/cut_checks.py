@@ -1,4 +1,4 @@
-"""What is cut or drilled: DXF files and drill table against bodies of the assembly.
+"""Cut and drilled parts: DXF files and drill table against bodies of the assembly.
 
 All that is on the layer `cut` is a cut of the body.
 """

@@ -1,4 +1,4 @@
-"""What weight does to the carrier: how far the balls move besides what a calibration finds.
+"""Sag of the carrier: how far balls move besides the motion that a calibration finds.
 
 A calibration finds a motion of the whole base for each stop, and where the balls are on it. What is
 left is the change of the carrier's shape from stop to stop. Of that motion a ball's mean over its
@@ -40,7 +40,7 @@ def checks(
     measured: MeasuredPrototype,
     drawn: Mapping[str, Shape],
 ) -> list[Check]:
-    """What is left of the carrier's sag after six freedoms at each stop, and that of the file.
+    """Residual of the carrier's sag after six freedoms at each stop, and that of the file.
 
     With a drive that has no shaft of its own only that seats are not placed against any. Unknown:
     there is no sag.csv, or not of these stops and balls.

@@ -150,7 +150,7 @@ class Design(Strict):
 
 
 class Entry(Strict):
-    """What the manifest says of a file."""
+    """A file's entry in the manifest."""
 
     size: int
     sha256: str
@@ -199,7 +199,7 @@ class Export:
 
     @property
     def rings(self) -> tuple[PrintedPart, ...]:
-        """What carries the shell's lamps."""
+        """The part that carries the shell's lamps."""
         return (self.lamps.ring,) if self.lamps else ()
 
     @property

@@ -127,7 +127,7 @@ def digest(folder: Path, name: str) -> tuple[int, str]:
 
 
 def stamps(folder: Path, names: Iterable[str]) -> dict[str, tuple[int, ...]]:
-    """What tells that a file was replaced or written to: device, inode, size and times, by name.
+    """Signs that a file was replaced or written to: device, inode, size and times, by name.
 
     Files that are not there are left out.
     """

@@ -194,7 +194,7 @@ def _verify_lamps(
 def _shell_measures(
     shell: ShellPart, measured: Mapping[str, PartMeasures], first: RayScene | None
 ) -> PartMeasures:
-    """What printers need to know of a shell; of a mirror image it is known already.
+    """Figures of a shell for printers; those of a mirror image are known already.
 
     `measured`: shells before it.
     `first`: scene of the first of two, if the second is its image.

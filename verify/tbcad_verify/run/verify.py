@@ -42,7 +42,7 @@ Steps = tuple[Files, Comparisons, list[Check]]
 
 @dataclass(frozen=True)
 class VerifyOptions:
-    """What else to verify, and how."""
+    """Options of a verification."""
 
     write: bool = True  # write verify.json into the folder
     # read the meshes in another process, so that a crash there becomes "unknown"
@@ -201,7 +201,7 @@ def _ask_programs(export: Export, results: CollectedResults, seconds: float) -> 
 def _expected(
     export: Export, part: PartFiles, spheres: int | None, results: Results
 ) -> ExpectedPart:
-    """What other programs should find in a part's files."""
+    """Contents that other programs should find in a part's files."""
     mass = results.masses.get(part.name)
     volume, area = (mass.volume, mass.area) if mass else (math.nan, math.nan)
     return ExpectedPart(

@@ -140,7 +140,7 @@ def flipped_recovery(recovery: Recovery) -> Recovery:
 
 
 def flipped_measures(measures: PartMeasures, mesh: Mesh, mass: MassProperties) -> PartMeasures:
-    """What a printer needs to know of the mirror image, given its mesh and mass."""
+    """Figures of the mirror image for printers, given its mesh and mass."""
     walls, holes = measures.walls, measures.holes
     return replace(
         measures,

@@ -1,4 +1,4 @@
-"""What `tbcad build --dry-run` prints: a dozen lines, or a record."""
+"""Output of `tbcad build --dry-run`: a dozen lines, or a record."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
