@@ -1,1 +1,1 @@
-"""Drawings of an export: a sheet for each made part, the optical layout, the assembly."""
+"""Drawings of a build: a sheet for each made part, the optical layout, the assembly."""

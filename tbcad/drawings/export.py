@@ -16,12 +16,12 @@ from tbcad.records.prototype import PrintedPartRecord
 
 SOLIDS = ("shell_a", "shell_b", "mandrel_a", "mandrel_b")
 PROTOTYPE_FILES = (PROTOTYPE, "bom.csv", "balls.csv", "wiring.csv")
-AGAIN = "build the export again"
+AGAIN = "run tbcad build again"
 
 
 @dataclass(frozen=True)
 class DrawnExport:
-    """An export that is drawn."""
+    """A build that is drawn."""
 
     folder: Path  # of it
     manifest: Manifest  # its files
@@ -51,7 +51,7 @@ class DrawnExport:
         raise InputError(f"{self.folder / 'bom.csv'} has no {part.listed_name}: {AGAIN}")
 
     def file(self, name: str) -> Path:
-        """A file of the export as it was written. InputError: it is missing, or another."""
+        """A file of the build as it was written. InputError: it is missing, or another."""
         return written_file(self.folder, self.manifest, name, AGAIN)
 
     def source(self, step: str) -> tuple[str, str]:
@@ -61,7 +61,7 @@ class DrawnExport:
 
 
 def read_export(folder: Path) -> DrawnExport:
-    """The export in a folder. InputError: none, or a file is missing or not as it was written."""
+    """The build in a folder. InputError: none, or a file is missing or not as it was written."""
     manifest = read_manifest(folder)
     if manifest is None:
         raise InputError(

@@ -107,7 +107,7 @@ def _edges(apex: Floats, centre: Floats, radius: Floats) -> Floats:
 
 
 def draw_layout(export: DrawnExport) -> list[Sheet]:
-    """The sheet of an export. InputError: its mirrors.csv is not as it was written."""
+    """The sheet of a build. InputError: its mirrors.csv is not as it was written."""
     export.file(MirrorRow.FILE)
     optics = export.design.spec.optics
     layout, capture = _layout(optics, MirrorRow.read(export.folder)), optics.capture_diameter_mm / 2

@@ -1,4 +1,4 @@
-"""All sheets of an export as PDF and DXF, drawn in several processes."""
+"""All sheets of a build as PDF and DXF, drawn in several processes."""
 
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -36,7 +36,7 @@ def write_drawings(
     progress: Progress = lambda _: None,
     workers: int = 1,
 ) -> list[WrittenSheet]:
-    """Draw an export into a folder, whose other files stay, in a number of processes.
+    """Draw a build into a folder, whose other files stay, in a number of processes.
 
     Without names in `only` everything is drawn; progress is called with each name that is done.
 
@@ -61,7 +61,7 @@ def write_drawings(
 
 
 def drawable(export: DrawnExport) -> list[str]:
-    """Names of all that can be drawn of an export, those that take longest first."""
+    """Names of all that can be drawn of a build, those that take longest first."""
     parts = sorted(export.parts, key=lambda name: (not name.startswith("carrier"), name))
     whole = [ASSEMBLY] if export.machine else []
     layout = [OPTICAL_LAYOUT] if has_layout(export.design) else []
@@ -79,7 +79,7 @@ def _chosen(export: DrawnExport, only: Sequence[str]) -> list[str]:
         if name not in names:
             near = get_close_matches(name, names, 1) or names[:1]
             raise InputError(
-                f"--only {name:.40} is nothing that this export can draw; the nearest is "
+                f"--only {name:.40} is nothing that this build can draw; the nearest is "
                 f"{near[0]}, all are: {', '.join(sorted(names))}"
             )
     return [name for name in names if name in only or not only]

@@ -142,7 +142,7 @@ class BuildOptions(Call):
 
 @dataclass(frozen=True)
 class VerificationOptions(Call):
-    """An export, and what else to verify of it."""
+    """A build, and what else to verify of it."""
 
     exports: Exports[AnyPath]
     _: KW_ONLY
@@ -174,14 +174,14 @@ class VerificationOptions(Call):
 
 @dataclass(frozen=True)
 class ReportOptions(Call):
-    """An export, and what its page shows."""
+    """A build, and what its page shows."""
 
     exports: Exports[AnyPath]
     out: Annotated[AnyPath | None, typer.Option("--out", "-o")] = None
     """HTML file to write; by default report.html in the folder."""
     _: KW_ONLY
     capture: Annotated[AnyPath | None, typer.Option(metavar="FOLDER")] = None
-    """Folder written by tbcad capture or merge for this export: shows the photograph in each
+    """Folder written by tbcad capture or merge for this build: shows the photograph in each
     mirror."""
     force: bool = False
     """Replace a file that tbcad did not write, instead of refusing."""
@@ -195,7 +195,7 @@ def check_yield(wanted_yield: float) -> None:
 
 @dataclass(frozen=True)
 class OrderOptions(Call):
-    """The shells of an export, the chain that makes them, and how many must be good."""
+    """The shells of a build, the chain that makes them, and how many must be good."""
 
     exports: Exports[AnyPath]
     _: KW_ONLY
@@ -209,7 +209,7 @@ class OrderOptions(Call):
 
 @dataclass(frozen=True)
 class ToleranceOptions(Call):
-    """An export, a process that makes it, and how its yield is simulated."""
+    """A build, a process that makes it, and how its yield is simulated."""
 
     exports: Exports[AnyPath]
     process: Annotated[str | None, typer.Option(metavar="NAME|FILE")] = None

@@ -60,7 +60,7 @@ class DatasetOptions(Call):
             raise InputError(f"--to is missing, allowed is one of {allowed}: add it")
         if (self.to == "mitsuba") != (self.exports is not None):
             raise InputError(
-                "--to mitsuba shows the shells of an export: give its folder by --exports"
+                "--to mitsuba shows the shells of a build: give its folder by --exports"
                 if self.exports is None
                 else f"--exports {self.exports} is for --to mitsuba: leave it out"
             )
@@ -119,7 +119,7 @@ class ReconstructOptions(Call):
 
 @dataclass(frozen=True)
 class CaptureOptions(Call):
-    """An export, an object before it, and how its photographs are traced."""
+    """A build, an object before it, and how its photographs are traced."""
 
     exports: Exports[AnyPath]
     object_file: ObjectFile[AnyPath] = None

@@ -120,7 +120,7 @@ class AsBuiltOptions(Call):
 
 @dataclass(frozen=True)
 class SimulateRunOptions(Call):
-    """An export, how it is built and lit, and what is photographed of it."""
+    """A build, how it is built and lit, and what is photographed of it."""
 
     exports: Exports[AnyPath]
     _: KW_ONLY

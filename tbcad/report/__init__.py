@@ -1,1 +1,1 @@
-"""Pictures of an export, drawn from its files alone."""
+"""Pictures of a build, drawn from its files alone."""

@@ -1,4 +1,4 @@
-"""Edges and seam of the mirrors close up: the facets of an export, and what follows from them.
+"""Edges and seam of the mirrors close up: the facets of a build, and what follows from them.
 
 Run as a program, `python -m tbcad.report.close_ups DIR edges|seam FILE`: see `shell_pictures`.
 """
@@ -100,7 +100,7 @@ def edge_of_field(cells: Cells, reflector: Reflector, mirror: int, along: Floats
 
 
 def draw(folder: Path, subject: str, picture: Path) -> None:
-    """Draw a subject of an export, "edges" or "seam", to a PNG file."""
+    """Draw a subject of a build, "edges" or "seam", to a PNG file."""
     export = read_export(folder)
     panels = SUBJECTS[subject](export)
     picture.write_bytes(figure_file(panels, INCHES))

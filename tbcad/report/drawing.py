@@ -23,9 +23,9 @@ MESHES = (".stl", ".glb")
 
 
 def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False) -> None:
-    """Draw one of SUBJECTS of an export to a PNG file, which is replaced as a whole.
+    """Draw one of SUBJECTS of a build to a PNG file, which is replaced atomically.
 
-    InputError: the export or a screen is missing, a file of the export is not as it was written,
+    InputError: the build or a screen is missing, a file of the build is not as it was written,
     the picture exists, or drawing fails.
     """
     if subject not in SUBJECTS:
@@ -43,7 +43,7 @@ def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False)
 
 
 def check_drawn_files(folder: Path, subject: str = PROTOTYPE[0]) -> None:
-    """Refuse an export that lacks a file that is drawn, or in which it is not as it was written."""
+    """Refuse a build that lacks a file that is drawn, or in which it is not as it was written."""
     manifest = read_manifest(folder)
     part, needed = "shell", [*SHELL_FILES]
     if subject in PROTOTYPE:

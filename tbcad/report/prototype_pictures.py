@@ -1,4 +1,4 @@
-"""Pictures of the prototype, drawn from an export's record and assembly.
+"""Pictures of the prototype, drawn from a build's record and assembly.
 
 Run as a program, as `shell_pictures`: `python -m tbcad.report.prototype_pictures DIR SUBJECT FILE`.
 """
@@ -30,7 +30,7 @@ ROWS = {"sides": 2}  # of pictures; one where nothing is said
 
 
 def draw(folder: Path, subject: str, picture: Path) -> None:
-    """Draw one of SUBJECTS of an export with a prototype to a PNG file."""
+    """Draw one of SUBJECTS of a build with a prototype to a PNG file."""
     rows = ROWS.get(subject, 1)
     size = (SIZE[0], rows * SIZE[1])
     plotter = pyvista.Plotter(off_screen=True, shape=(rows, 2), window_size=size, border=False)

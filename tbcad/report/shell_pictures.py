@@ -1,4 +1,4 @@
-"""Pictures and sections of the shells, from an export's STL files and mirrors.csv.
+"""Pictures and sections of the shells, from a build's STL files and mirrors.csv.
 
 Run as a program, `python -m tbcad.report.shell_pictures DIR shell FILE`: drawing without a screen
 may crash the process, so the command starts it as a child.

@@ -203,7 +203,7 @@ def _as_made(mirrors: MirrorDesign) -> AsMade:
 def as_made(
     exports: Path | str, progress: Progress = silent, detail: Progress = silent
 ) -> AsMade | None:
-    """Simulate a few builds of an export by every built-in process.
+    """Simulate a few copies of a build by every built-in process.
 
     None where no shell was built, or its record cannot be read.
     """
@@ -223,9 +223,9 @@ def as_made(
 
 @keywords(ReportOptions)
 def report_page(options: ReportOptions) -> Path:
-    """Write the page that shows an export: one HTML file with its verdict, 3D view and tables.
+    """Write the page that shows a build: one HTML file with its verdict, 3D view and tables.
 
-    InputError: the export or the capture cannot be read, or the file may not be written.
+    InputError: the build or the capture cannot be read, or the file may not be written.
     """
     folder = Path(options.exports)
     file, light_field = (

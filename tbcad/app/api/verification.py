@@ -33,7 +33,7 @@ def verify(options: VerificationOptions) -> Report:
         The report; `report.passed` is the verdict. It is written to verify.json too.
 
     Raises:
-        InputError: the folder is no readable export.
+        InputError: the folder is no readable build.
     """
     options.check()
     from tbcad_verify.errors import BadExport
@@ -87,7 +87,7 @@ def tolerance(options: ToleranceOptions) -> Analysis:
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.tolerancing.analysis import analyse as analyse_export
 
-    options.progress("record of the export")
+    options.progress("record of the build")
     export = read_export(exports)
     taken = ObjectOptions(up=options.up, unit=options.unit)
     subject = load_object(options.object_file, export.capture_mm, taken, options.answer)
@@ -115,7 +115,7 @@ def order(options: OrderOptions) -> dict[str, Any]:
     """Write what a workshop needs to make the shells of a build by a process chain; order.json.
 
     By how much each mirror may be off and what the chain holds of it: tables, STEP with tolerances,
-    and a page that says the rest. InputError: the export has no shells, or no mandrels that the
+    and a page that says the rest. InputError: the build has no shells, or no mandrels that the
     chain needs, their mirrors are planar or may not be off at all, the chain cannot be read, the
     share is not between 0 and 1, or out cannot be replaced.
     """

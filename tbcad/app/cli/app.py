@@ -141,7 +141,7 @@ def of_design(prepare: Callable[..., Work]) -> Callable[..., int]:
 
 
 def of_export(prepare: Callable[..., Work]) -> Callable[..., int]:
-    """A command for a study of an export: takes its folder, then options of its own."""
+    """A command for a study of a build: takes its folder, then options of its own."""
     return _command(prepare, _folder)
 
 

@@ -36,7 +36,7 @@ class Term(Words):
     unit: str = ""  # of it
     source: str = ""  # of the definition
     keys: tuple[str, ...] = ()  # of a design, that set it
-    # of an export, with the columns that hold it: "mirrors.csv: px, py, pz"
+    # of a build, with the columns that hold it: "mirrors.csv: px, py, pz"
     files: tuple[str, ...] = ()
     code: tuple[str, ...] = ()  # dotted names of what computes it
 

@@ -1,1 +1,1 @@
-"""How a prototype is assembled: steps with their parts, worked out from an export's files."""
+"""How a prototype is assembled: steps with their parts, worked out from a build's files."""

@@ -78,7 +78,7 @@ class AssembledMachine:
 
 
 def read_machine(folder: Path) -> AssembledMachine:
-    """The prototype of an export.
+    """The prototype of a build.
 
     InputError: a file is missing or broken, or was written by an earlier version.
     """

@@ -109,7 +109,7 @@ def read_sag(folder: Path) -> Sag | None:
     if [(row.stop, row.ball) for row in rows] != [(s + 1, k + 1) for s, k in np.ndindex(shape)]:
         raise InputError(
             f"{folder / SagRow.FILE} has not a row for each of {shape[0]} stops and {shape[1]} "
-            "balls, in order: build the export again"
+            "balls, in order: run tbcad build again"
         )
     angle = np.radians([row.base_angle_deg for row in stops])
     axes = np.array([record.frame.axis, record.frame.zero, record.frame.third])

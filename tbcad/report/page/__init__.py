@@ -1,1 +1,1 @@
-"""report.html: one file that shows an export; its data by Python, its views by scripts beside."""
+"""report.html: one file that shows a build; its data by Python, its views by scripts beside."""

@@ -1,4 +1,4 @@
-"""Pictures in the page: those beside the export, and the photographs of a capture."""
+"""Pictures in the page: those beside the build, and the photographs of a capture."""
 
 import base64
 import warnings
@@ -71,8 +71,8 @@ def photographs(capture: Path, ids: list[str]) -> dict[str, Any]:
             wanted = sum(one.startswith(camera) for one in ids)
             if len(frame.u) != wanted:
                 raise InputError(
-                    f"{capture}: camera {camera} has {len(frame.u)} mirrors, the export {wanted}: "
-                    "name a capture of this export"
+                    f"{capture}: camera {camera} has {len(frame.u)} mirrors, the build {wanted}: "
+                    "name a capture of this build"
                 )
             picture = _jpeg(camera, frame.image(), PHOTOGRAPH_SIDE_PX)
             x0, x1, y0, y1 = frame.boxes.T

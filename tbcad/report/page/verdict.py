@@ -61,7 +61,7 @@ class Verdict(Record):
 
 
 def read_verdict(folder: Path) -> Verdict | None:
-    """The verification of an export; None if it was not verified.
+    """The verification of a build; None if it was not verified.
 
     InputError: verify.json is damaged.
     """
@@ -156,7 +156,7 @@ def _as_made(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
 def checks_html(verdict: Verdict | None) -> Iterator[str]:
     """Failed checks, then all checks by name."""
     if verdict is None:
-        yield "<p>This export is not verified.</p>"
+        yield "<p>This build is not verified.</p>"
         return
     every = (*verdict.checks, *verdict.programs)
     failed = [check for check in every if check.passed is not True]
@@ -198,7 +198,7 @@ def _figure(value: float | None, digits: int = 5) -> str:
 def printing_html(rows: Sequence[PrintRow]) -> Iterator[str]:
     """Parts against processes: can be made, or why not."""
     if not rows:
-        yield "<p>Not known: this export is not verified.</p>"
+        yield "<p>Not known: this build is not verified.</p>"
         return
     printers = {row.profile: row for row in rows}
     cells = {(row.part, row.profile): row for row in rows}

@@ -1,4 +1,4 @@
-"""report.html of an export: verdict, 3D view, map of the virtual cameras, tables, pictures."""
+"""report.html of a build: verdict, 3D view, map of the virtual cameras, tables, pictures."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
@@ -79,9 +79,9 @@ def write_report(
     *,
     force: bool = False,
 ) -> Path:
-    """Write the page of an export, by default as its report.html, which may show a capture of it.
+    """Write the page of a build, by default as its report.html, which may show a capture of it.
 
-    InputError: the file exists, the export or the capture cannot be read, or writing fails.
+    InputError: the file exists, the build or the capture cannot be read, or writing fails.
     """
     file = out or folder / REPORT
     check_writable(file, force)
@@ -110,9 +110,9 @@ def page(
     *,
     linked: bool = True,
 ) -> str:
-    """The page of an export; linked: with links to its files.
+    """The page of a build; linked: with links to its files.
 
-    InputError: the export or the capture cannot be read.
+    InputError: the build or the capture cannot be read.
     """
     manifest = _checked_manifest(folder)
     export, verdict = read_export(folder), read_verdict(folder)
@@ -145,7 +145,7 @@ def page(
 
 
 def _checked_manifest(folder: Path) -> Manifest:
-    """The manifest; refuses an export in which a file that is shown is not as it was written."""
+    """The manifest; refuses a build in which a file that is shown is not as it was written."""
     manifest = read_manifest(folder)
     if manifest is None:
         raise InputError(f"{folder / MANIFEST} is not there: {MISSING}")
@@ -220,7 +220,7 @@ def _joined(lines: Iterable[str]) -> str:
 def parts_html(parts: PartsList | None) -> Iterator[str]:
     """Totals, then every row."""
     if parts is None:
-        yield "<p>This export has no prototype, and so no parts list.</p>"
+        yield "<p>This build has no prototype, and so no parts list.</p>"
         return
     sums = parts.record()["totals"]
     yield "<dl class=totals>"
@@ -264,7 +264,7 @@ def _number(value: Any, digits: int) -> str:
 
 
 def files_html(sizes: Mapping[str, int], linked: bool) -> Iterator[str]:
-    """The files of the export; linked where the page lies beside them."""
+    """The files of the build; linked where the page lies beside them."""
     yield "<details><summary>" + f"{len(sizes)} files</summary><ul class=files>"
     for name in sorted(sizes):
         shown = escape(name)

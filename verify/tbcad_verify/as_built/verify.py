@@ -159,7 +159,7 @@ def _mm(value: float | None) -> str:
 def verify_as_built(
     folder: Path, calibration: Path, progress: Progress = lambda _: None
 ) -> AsBuiltReport:
-    """Verify the prototype of an export as a calibration found it.
+    """Verify the prototype of a build as a calibration found it.
 
     `progress`: called with the name of each stage.
 

@@ -74,8 +74,8 @@ def halves(context: PrototypeContext, machine: AsBuilt) -> list[Half]:
     """
     if len(machine.balls) != len(context.prototype.balls):
         raise BadExport(
-            f"machine.json has {len(machine.balls)} balls, the export "
-            f"{len(context.prototype.balls)}; name the export that was calibrated"
+            f"machine.json has {len(machine.balls)} balls, the build "
+            f"{len(context.prototype.balls)}; name the build that was calibrated"
         )
     mine = context.prototype.camera
     others = [name for name in context.export.cameras if name != mine]

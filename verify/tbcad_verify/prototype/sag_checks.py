@@ -47,7 +47,7 @@ def checks(
     """
     if SHAFT not in drawn:
         return [_beside(names[2], context, measured, 0.0)]
-    table = require(context.prototype.sag, "the export has no sag.csv")
+    table = require(context.prototype.sag, "the build has no sag.csv")
     turn = context.base_rotation(np.radians(context.prototype.stops.angle)).as_matrix()
     down = np.array([0.0, 0.0, -1.0]) @ turn
     own = np.einsum("kab,sb->ska", _by_weight(context, parts, measured, drawn), down)

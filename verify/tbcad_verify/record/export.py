@@ -1,4 +1,4 @@
-"""The records of an export: design.json, mirrors.csv, manifest.json and those of a prototype.
+"""The records of a build: design.json, mirrors.csv, manifest.json and those of a prototype.
 
 Only requirements and poses are taken from here. What the mirrors are is measured on the mesh.
 """
@@ -157,7 +157,7 @@ class Entry(Strict):
 
 
 class Manifest(Strict):
-    """manifest.json: every file of the export. Builds of earlier versions tell no kind."""
+    """manifest.json: every file of the build. Builds of earlier versions tell no kind."""
 
     kind: Literal["build"] = "build"
     files: dict[str, Entry] = Field(min_length=1)
@@ -229,7 +229,7 @@ class Export:
 
 
 def listed_names(folder: Path) -> frozenset[str]:
-    """Names of all files that belong to an export, by its manifest alone.
+    """Names of all files that belong to a build, by its manifest alone.
 
     BadExport: the folder is no export, which is told at once however much is in it.
     """

@@ -68,7 +68,7 @@ class ShellPart:
 
 
 def measure_shells(export: Export, stls: list[Facets]) -> list[ShellPart]:
-    """Every shell of an export, given the facets of each."""
+    """Every shell of a build, given the facets of each."""
     if _second_is_image(export, stls):
         first = _measure_shell(export, export.parts[0], stls[0])
         return [first, first.mirror_image(export.parts[1])]

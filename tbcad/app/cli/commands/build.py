@@ -85,9 +85,9 @@ def verify_command(
     quiet: Quiet = False,
     json: Json = False,
 ) -> int:
-    """Verify an export on its files, and write verify.json there.
+    """Verify a build on its files, and write verify.json there.
 
-    Exit code 0: verified. 1: the verification fails. 2: not an export, or a broken one.
+    Exit code 0: verified. 1: the verification fails. 2: not a build, or a broken one.
     """
     output, folder = output_mode(full, quiet, json), Path(options.exports)
     asked = (options.printers, options.clients, options.strict, options.cutter)
@@ -134,7 +134,7 @@ def picture(
     of: OfOption = "shell",
     force: ForceFile = False,
 ) -> int:
-    """Draw the shells or the prototype from the files of an export."""
+    """Draw the shells or the prototype from the files of a build."""
     from tbcad.report.drawing import picture as draw
 
     file = out or Path(f"{of}.png")

@@ -34,7 +34,7 @@ def capture(
     prototype: PrototypeOption = False,
     json: JsonResult = False,
 ) -> int:
-    """Simulate the photographs of an object by both cameras through the mirrors of an export.
+    """Simulate the photographs of an object by both cameras through the mirrors of a build.
 
     Writes both photographs at the full size of the sensors, and the light field: the ray, colour
     and mirror of every pixel.

@@ -1,4 +1,4 @@
-"""The command that shows an export or a light field in the browser."""
+"""The command that shows a build or a light field in the browser."""
 
 from contextlib import contextmanager
 from pathlib import Path
@@ -65,9 +65,9 @@ def show(
     force: ForceFile = False,
     json: JsonResult = False,
 ) -> int:
-    """Show an export, a light field or a field in the browser.
+    """Show a build, a light field or a field in the browser.
 
-    Of an export, opens report.html. Of a light field or a field, opens a page on which dragging
+    Of a build, opens report.html. Of a light field or a field, opens a page on which dragging
     moves the viewpoint and the wheel changes the distance; of a light field sliders set aperture
     and focus. tbcad makes the views and answers this computer alone; it goes on until Ctrl-C.
     """

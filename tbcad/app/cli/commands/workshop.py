@@ -99,7 +99,7 @@ def parts(
         bool, typer.Option("--json", help="Print totals and all rows as JSON.")
     ] = False,
 ) -> int:
-    """Show what an export's prototype needs: totals of price, mass, filament and hours, then rows.
+    """Show what a build's prototype needs: totals of price, mass, filament and hours, then rows.
 
     Without --full the rows are those that cost most. Exit code 0, or 2 for bad input.
     """
@@ -117,7 +117,7 @@ def sag(
     folder: Exports[Path],
     json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
 ) -> int:
-    """Show how far weight moves the balls of an export's prototype as its base turns.
+    """Show how far weight moves the balls of a build's prototype as its base turns.
 
     Carrier, bearing head, shaft and uprights bend; modulus and infill are those of [printer]. What
     is left is after a calibration that moves each stop's balls as one. Exit code 0, or 2 for bad
@@ -150,7 +150,7 @@ def drawings(
     ] = False,
     force: ForceFile = False,
 ) -> int:
-    """Draw an export for the workshop: sheets as PDF to scale and as DXF at full size.
+    """Draw a build for the workshop: sheets as PDF to scale and as DXF at full size.
 
     A sheet for each printed part with views, sizes and a table of its holes; the assembly with
     call-outs by number of the parts list; sections of the shells; the optical layout. Exit code 0,
@@ -186,7 +186,7 @@ def assembly(
     ] = False,
     force: ForceFile = False,
 ) -> int:
-    """Write assembly.html: how an export's prototype is assembled, step by step, with pictures.
+    """Write assembly.html: how a build's prototype is assembled, step by step, with pictures.
 
     Each step names its parts by their numbers in the list, torque or fit, and what to check. Exit
     code 0, or 2 for bad input.
