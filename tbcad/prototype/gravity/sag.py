@@ -108,7 +108,7 @@ def read_sag(folder: Path) -> Sag | None:
     shape = len(stops), len(balls)
     if [(row.stop, row.ball) for row in rows] != [(s + 1, k + 1) for s, k in np.ndindex(shape)]:
         raise InputError(
-            f"{folder / SagRow.FILE} has not a row for each of {shape[0]} stops and {shape[1]} "
+            f"{folder / SagRow.FILE} lacks a row for each of {shape[0]} stops and {shape[1]} "
             "balls, in order: run tbcad build again"
         )
     angle = np.radians([row.base_angle_deg for row in stops])

@@ -136,7 +136,7 @@ class AsBuiltReport:
                 yield shortened(f"- {check.name}: {measured}: {check.detail}")
                 yield f"    -> {remedy(check)}"
         yield (
-            f"The base as a whole: zero off by {self.turn_deg:.3f} degrees, tilted by "
+            f"The whole base: error of zero {self.turn_deg:.3f} degrees, tilted by "
             f"{self.tilt_deg:.3f}, {self.shift_mm:.3f} mm aside"
         )
         yield from HEAD

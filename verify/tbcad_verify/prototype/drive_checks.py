@@ -142,7 +142,7 @@ def gear_of(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Gear:
             raise Unknown(f"there is no {name} of known teeth")
         teeth, rim = int(pulley[1]), next(face for face in solids[name].faces if not face.hollow)
         if abs(rim.radius - teeth * PITCH_MM / (2 * np.pi) - RIM_MM) > AXIS_MM:
-            raise Unknown(f"the {name} of the assembly has not {teeth} teeth")
+            raise Unknown(f"the {name} of the assembly does not have {teeth} teeth")
         found.append((teeth, rim, float(pulley[2] or NARROW_MM)))
     (teeth, wheel, width), (few, pinion, other) = found
     if width != other:
