@@ -44,13 +44,12 @@ CAN_BE_MADE = 0.95  # yield
 HEAD = """\
 # Gallery of designs
 
-The designs that come with tbcad, to choose one to begin from:
-`tbcad init my.toml --from afternoon-print`. Other numbers of mirrors:
-[every subdivision n](every-n.md). Figures are those of a dry run. Pictures: left, what camera a
+The designs that come with tbcad, to begin from one: `tbcad init my.toml --from afternoon-print`.
+Other numbers of mirrors: [every subdivision n](every-n.md). Pictures: left, what camera a
 photographs of a knot that fills the capture sphere; right, a view from azimuth 30, elevation 30
-degrees, as `tbcad view` makes it. With few virtual cameras some of its depth is wrong (specks).
+degrees. With few virtual cameras some of its depth is wrong (specks).
 
-`python docs/gallery.py NAME` renews the figures of a design on this page.
+`python docs/gallery.py NAME` renews the figures of a design, which are those of a dry run.
 """
 
 MADE_COLUMNS = ["design", "made by", "yield", "worst camera"]
@@ -59,9 +58,8 @@ MADE = """\
 ## What can be made
 
 *Made by*: the [chains](tolerance.md#chains) with a yield of 95 % or more in 1,000 simulated builds.
-Yield and median of the worst virtual cameras are those of the best chain. Repeat a row with
-`tbcad build turtleback-nickel --out exports/` and
-`tbcad tolerance exports/ --process nickel-diamond`. `tbcad build NAME --for-process CHAIN` gives a
+Yield and median of the worst virtual cameras are those of the best chain
+(`tbcad tolerance exports/ --process nickel-diamond`). `tbcad build NAME --for-process CHAIN` gives a
 design the margins that a chain needs.
 
 {}"""
