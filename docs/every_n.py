@@ -18,7 +18,7 @@ from tbcad.output.overview import overview
 DOCS = Path(__file__).parent
 RESULTS, PAGE = DOCS / "every-n.json", DOCS / "every-n.md"
 SUBDIVISIONS = range(2, 41)
-COLUMNS = ("n", "mirrors", "lens, degrees", "balls+caps", "pixels kept", "turning mass, g")
+COLUMNS = ("n", "mirrors", "lens, degrees", "balls+caps", "pixels kept")
 EVERY_TO = 13  # beyond, every other n, and those that were built
 BEGIN, END = "<!-- table -->\n", "<!-- end -->\n"
 
@@ -58,9 +58,9 @@ def page_row(n: str, row: dict[str, Any]) -> str:
     cells.append(f"{row['view_angle_deg']:.0f}")
     if "balls" in row:
         cells.append(f"{row['balls']}+{row['caps']}")
-        cells += [f"{row['kept_share']:.0%}", f"{row['turning_mass_g']}"]
+        cells.append(f"{row['kept_share']:.0%}")
     else:
-        cells += ["none", "", ""]
+        cells += ["none", ""]
     return "| " + " | ".join(map(str, cells)) + " |"
 
 
