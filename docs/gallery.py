@@ -103,7 +103,8 @@ def figures(found: Overview) -> dict[str, Any]:
     }
     if prototype is not None:
         rows["prototype"] = (
-            f"{prototype.balls} balls and {prototype.caps} caps, {prototype.stops} stops; "
+            f"{prototype.balls} ball{'s' * (prototype.balls != 1)} and {prototype.caps} "
+            f"cap{'s' * (prototype.caps != 1)}, {prototype.stops} stops; "
             f"{prototype.kept_share:.0%} of the shell's pixels"
         )
     return {name: value for name, value in rows.items() if value} | {"chains": chains(spec)}
