@@ -59,7 +59,7 @@ MADE = """\
 
 *Made by*: the [chains](tolerance.md#chains) with a yield of 95 % or more in 1,000 simulated builds.
 Yield and median of the worst virtual cameras are those of the best chain
-(`tbcad tolerance exports/ --process nickel-diamond`). `tbcad build NAME --for-process CHAIN` gives
+(`tbcad tolerance exports/ --process nickel-diamond`). `tbcad build NAME --process CHAIN` gives
 a design the margins that a chain needs.
 
 {}"""

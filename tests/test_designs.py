@@ -17,7 +17,7 @@ from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.mirror_arrays import designed
 
 DESIGNS = Path(__file__).parents[1] / "designs"
-PAPER = DESIGNS / "turtleback.toml"
+PAPER, BUILT = DESIGNS / "paper.toml", DESIGNS / "turtleback.toml"
 KEYS = {key: field for key, field in dotted_fields(Spec) if section_of(field) is None}
 
 
@@ -29,15 +29,23 @@ def dotted(table: dict[str, object], prefix: str = "") -> set[str]:
     return keys
 
 
-def test_the_papers_design_is_the_default() -> None:
-    assert load_spec(PAPER) == load_spec(None) == Spec()
+def test_the_papers_design_with_margins_is_the_default() -> None:
+    assert load_spec(BUILT) == load_spec(None) == Spec()
 
 
 def test_the_papers_design_sets_what_the_paper_says() -> None:
     """Geometry, sensor and radii, none left out; what a key means is told by its model alone."""
     own = {key for key in KEYS if key.startswith(("optics.", "camera."))}
-    radii = {"mirrors.radius_rule", "mirrors.margin_mm"}
-    assert dotted(tomllib.loads(PAPER.read_text(encoding="utf-8"))) == {"name", *own, *radii}
+    own |= {"name", "mirrors.radius_rule", "mirrors.margin_mm"}
+    more = {"prototype.ball_margin_mm", "prototype.motion.exposure_s"}
+    assert dotted(tomllib.loads(BUILT.read_text(encoding="utf-8"))) == own
+    assert dotted(tomllib.loads(PAPER.read_text(encoding="utf-8"))) == own | more
+
+
+def test_the_papers_design_has_no_margins() -> None:
+    paper = load_spec(PAPER)
+    assert (paper.mirrors.margin_mm, paper.prototype.ball_margin_mm) == (0, 0)
+    assert (paper.optics, paper.camera.width_px) == (Spec().optics, Spec().camera.width_px)
 
 
 @pytest.mark.parametrize("path", sorted(DESIGNS.glob("*.toml")), ids=lambda path: path.stem)

@@ -40,7 +40,7 @@ def write_drawings(
 
     Without names in `only` everything is drawn; progress is called with each name that is done.
 
-    InputError: no export, a file of it is not as it was written, a name is unknown, or files cannot
+    InputError: no build, a file of it is not as it was written, a name is unknown, or files cannot
     be written or exist.
     """
     export = read_export(folder)

@@ -68,7 +68,7 @@ class Figure:
 class Chain:
     """A chain as it is asked for, and what its builds of a design show."""
 
-    name: str  # as --chain has it
+    name: str  # as --process has it
     process: Process
     wanted: float  # share of the shells that must be good
     good: float  # share of simulated builds that are
@@ -91,7 +91,7 @@ class Chain:
 
 def refused(name: str) -> str:
     """The verdict on what a chain does not hold."""
-    return f"{NOT_HELD}: order a larger margin with --for-process {name}"
+    return f"{NOT_HELD}: order a larger margin with --process {name}"
 
 
 def chain_of(
@@ -106,8 +106,8 @@ def chain_of(
     cutter, smallest = process.mandrel_cutter_mm, float(radius.min())
     if cutter is not None and cutter >= smallest:
         raise InputError(
-            f"--chain {name}: the mandrel's cutter has a radius of {cutter:g} mm, allowed is less "
-            f"than that of the smallest mirror, {smallest:.3g} mm: name a smaller one"
+            f"--process {name}: the mandrel's cutter has a radius of {cutter:g} mm, allowed is "
+            f"less than that of the smallest mirror, {smallest:.3g} mm: name a smaller one"
         )
     length, kinds = process.warp_um.length_mm, found.each.shape[1]
     each, mandrel, replica = (

@@ -231,7 +231,7 @@ def checked_export(folder: Path, process: Process, chain: str) -> ExportedDesign
     """Read an export whose shells a chain can make: its solids are there, no mirror is planar."""
     export, remedies = read_export(folder), {"shell": "build the shell too, tbcad build"}
     if process.mandrel_cutter_mm is not None:
-        way = "tbcad build --set shell.negative=true, or with --for-process"
+        way = "tbcad build --set shell.negative=true, or with --process"
         remedies["mandrel"] = f"{chain} takes shells from mandrels: {way} {chain}"
     for solid, remedy in remedies.items():
         missing = (one for half in "ab" if not (one := folder / f"{solid}_{half}.step").is_file())
@@ -253,7 +253,7 @@ def write_order(
     options.progress("sensitivities")
     found, limits = found_limits(export, options.wanted)
     options.progress(process.name)
-    chain = chain_of(export, process, options.chain, limits, options.wanted)
+    chain = chain_of(export, process, options.process, limits, options.wanted)
     files = [RECORD]
     of_shells = halves(export, limits, chain.each)
     shares = np.split(chain.mandrel_share, 2)

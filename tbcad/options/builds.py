@@ -117,7 +117,7 @@ class BuildOptions(Call):
     spec: Design[AnyDesign] = None
     out: OutReplaced[AnyPath] = Path("exports")
     _: KW_ONLY
-    n: Annotated[int | str | None, typer.Option(metavar="N")] = None
+    n: Annotated[int | str | None, typer.Option("--n", "-n", metavar="N")] = None
     """Subdivision of the icosahedron, 2 to 60; mirrors grow with n squared."""
     radius_rule: Literal["traced", "paper", "flat"] | None = None
     """traced: by exact rays, every mirror sees the whole object; paper: eqs. 1 and 2 of the paper;
@@ -127,14 +127,12 @@ class BuildOptions(Call):
     parts: str | Sequence[str] | None = None
     """What to build: shell, prototype, or shell,prototype. By default both, but no prototype of
     planar mirrors."""
-    for_process: Annotated[
-        str | None, typer.Option("--for-process", "--process", metavar="NAME|FILE")
-    ] = None
+    process: Annotated[str | None, typer.Option(metavar="NAME|FILE")] = None
     """Choose edges and coverage margins for a manufacturing process, and say what they cost:
     nickel-diamond, cnc, sla ... or a TOML file; see tbcad tolerance. A design that names its edges
     keeps them."""
     wanted_yield: Annotated[float | None, typer.Option("--yield")] = None
-    """With --for-process: share of simulated builds that must reach the target; by default 0.99."""
+    """With --process: share of simulated builds that must reach the target; by default 0.99."""
     verify: bool = True
     """Verify the files after they are written."""
     force: Force = False
@@ -195,11 +193,11 @@ def check_yield(wanted_yield: float) -> None:
 
 @dataclass(frozen=True)
 class OrderOptions(Call):
-    """The shells of a build, the chain that makes them, and how many must be good."""
+    """The shells of a build, the process that makes them, and how many must be good."""
 
     exports: Exports[AnyPath]
     _: KW_ONLY
-    chain: Annotated[str, typer.Option(metavar="NAME|FILE")] = "nickel-diamond"
+    process: Annotated[str, typer.Option(metavar="NAME|FILE")] = "nickel-diamond"
     """How they are made: nickel-diamond, cnc, sla ... or a TOML file; see tbcad tolerance."""
     wanted: Annotated[float, typer.Option("--yield")] = 0.99
     """Share of the shells that must be good with the standard deviations."""
@@ -221,7 +219,7 @@ class ToleranceOptions(Call):
     unit: UnitOption = None
     margins: bool = False
     """Also search for the minimum margin on the coverage with which each process reaches the yield,
-    as tbcad build --for-process does; some 10 s a process."""
+    as tbcad build --process does; some 10 s a process."""
     settings: Annotated[Changes, typer.Option("--set", metavar="KIND=VALUE")] = ()
     """Change any error of the process; repeatable."""
     builds: Annotated[int, typer.Option(min=1, max=1_000_000)] = 1000

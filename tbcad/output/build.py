@@ -1,4 +1,4 @@
-"""An export: the record, what was asked for, and the manifest."""
+"""A build: the record, what was asked for, and the manifest."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future

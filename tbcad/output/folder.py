@@ -239,7 +239,7 @@ def _make_parents(folder: Path, undo: ExitStack) -> None:
     missing = [parent for parent in [folder, *folder.parents] if not parent.exists()]
     for parent in reversed(missing):
         parent.mkdir(exist_ok=True)
-        undo.callback(_remove_empty, parent)  # which an export inside prevents
+        undo.callback(_remove_empty, parent)  # which a build inside prevents
 
 
 def _remove_empty(folder: Path) -> None:

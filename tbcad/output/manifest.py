@@ -77,7 +77,7 @@ def written_file(folder: Path, manifest: Manifest | None, name: str, remedy: str
         raise InputError(f"{path} is missing: {remedy}")
     if not is_listed(path, manifest.files.get(name) if manifest else None):
         raise InputError(
-            f"{path} is not as tbcad wrote it (cut off, or changed since): build the export again"
+            f"{path} is not as tbcad wrote it (cut off, or changed since): build it again"
         )
     return path
 

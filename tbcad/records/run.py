@@ -143,7 +143,7 @@ class RunRecord(Document):
     """What a run is to photograph: every frame in every phase.
 
     Attributes:
-        export_sha256: of each file of the export that the run depends on, by name.
+        export_sha256: of each file of the build that the run depends on, by name.
         source: "camera", or "simulated" by tbcad simulate-run.
         camera: model of the camera.
         width_px: columns of every photograph.

@@ -123,7 +123,7 @@ def as_built(calibration: Path, exports: Path, folder: Path) -> dict[str, Any]:
     if len(machine.radius) != len(plan):
         raise InputError(
             f"{calibration} has {len(machine.radius)} balls, {exports} has {len(plan)}: name the "
-            "export that was calibrated with --exports"
+            "build that was calibrated with --exports"
         )
     found = deviations(machine, plan)
     write_assembly(folder / STEP, "prototype_as_built", [ball_group(machine, plan, found)])

@@ -178,7 +178,7 @@ def exposure_of(
 def export_digests(
     exports: Path, names: Iterable[str], if_there: Iterable[str] = ()
 ) -> dict[str, str]:
-    """sha256 of files of an export by name, of some only where they are there.
+    """sha256 of files of a build by name, of some only where they are there.
 
     InputError: one is not there, or cannot be read.
     """
@@ -194,12 +194,12 @@ def export_digests(
 
 
 def check_same_export(folder: Path, record: RunRecord, exports: Path) -> None:
-    """Refuse an export whose files are not those that a run began with; InputError: which."""
+    """Refuse a build whose files are not those that a run began with; InputError: which."""
     for name, digest in record.export_sha256.items():
         if export_digests(exports, [name])[name] != digest:
             raise InputError(
                 f"{exports / name} is not the file that {folder} was photographed with: name the "
-                "export of that run"
+                "build of that run"
             )
 
 

@@ -79,7 +79,7 @@ def check_margins_can_be_set(spec: Spec, wanted_yield: float) -> None:
     check_yield(wanted_yield)
     if spec.mirrors.radius_rule != "traced":
         raise InputError(
-            f"--for-process sets margins, which radii of rule {spec.mirrors.radius_rule} do not "
+            f"--process sets margins, which radii of rule {spec.mirrors.radius_rule} do not "
             "follow: use --radius-rule traced"
         )
 

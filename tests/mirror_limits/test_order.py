@@ -118,7 +118,7 @@ def test_what_is_refused(
         ((sample, "--out", out), "its mirrors are planar"),
         ((exports, "--yield", "1.5"), "--yield 1.5: allowed is"),
     ):
-        assert wrong in cli("order", "--chain", "cnc", *words, code=2).err
+        assert wrong in cli("order", "--process", "cnc", *words, code=2).err
     told = cli("inspection", exports, code=2).err
     assert "tbcad inspection is called order: write tbcad order" in told
     assert not out.exists()
@@ -183,8 +183,8 @@ def test_what_is_not_held_is_never_quoted_as_held(
     exports: Path, tmp_path: Path, cli: Callable[..., Any]
 ) -> None:
     out = tmp_path / "out"
-    told = cli("order", exports, "--chain", "sla", "--out", out, code=1).out
-    remedy = "not held: order a larger margin with --for-process sla"
+    told = cli("order", exports, "--process", "sla", "--out", out, code=1).out
+    remedy = "not held: order a larger margin with --process sla"
     offset = next(line for line in told.splitlines() if "offset" in line)
     assert offset.endswith(remedy)
     assert (out / "shell_a_tolerances.step").read_text("ascii").count(remedy) >= 2
@@ -200,7 +200,7 @@ def test_chains_that_are_refused(exports: Path, tmp_path: Path, cli: Callable[..
         (OWN + "measured_with = { value = 'a', source = 'test', uncertainty_um = 0 }", "step bath"),
     ):
         own.write_text(text, encoding="utf-8")
-        assert wrong in cli("order", exports, "--chain", own, "--out", out, code=2).err
+        assert wrong in cli("order", exports, "--process", own, "--out", out, code=2).err
     process = load_process("nickel-milled").model_copy(update={"mandrel_cutter_mm": 90.0})
     limits = MirrorLimits(np.ones((98, 3)), np.ones((98, 3)), 1.0)
     with pytest.raises(InputError, match="radius of 90 mm, allowed is less than"):

@@ -80,7 +80,7 @@ def test_all_mirrors_at_their_limits_are_good(
 def test_files_name_walls_and_their_limits(
     folder: Path, made: MirrorDesign, tmp_path: Path
 ) -> None:
-    order(folder, chain="diamond", out=tmp_path / "out")
+    order(folder, process="diamond", out=tmp_path / "out")
     rows = read_csv(tmp_path / "out" / "inspection_b.csv")
     record = json.loads((tmp_path / "out" / "order.json").read_text(encoding="utf-8"))
     smallest = record["limits"]["smallest"]

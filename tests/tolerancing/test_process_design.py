@@ -1,4 +1,4 @@
-"""tbcad build --for-process: the margins that a process needs, in the design that is built."""
+"""tbcad build --process: the margins that a process needs, in the design that is built."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -119,7 +119,7 @@ def test_command(tmp_path: Path, cli: Callable[..., Any]) -> None:
     build = ["build", "--n", "4", "--parts", "shell", "--no-verify"]
     build += ["--set", "width_px=416", "--set", "height_px=310"]
     asked = [*build, "--out", out, "--set", "margin_mm=0.2"]
-    said = cli(*asked, "--for-process", "cnc", "--yield", "0.9").err
+    said = cli(*asked, "--process", "cnc", "--yield", "0.9").err
     spec = json.loads((out / "design.json").read_text())["spec"]
     mirrors, edges = spec["mirrors"], spec["shell"]["edges"]
     options = [f"mirrors.{key}={mirrors[key]}" for key in ("margin_mm", "own_margins_mm")]
@@ -131,7 +131,7 @@ def test_command(tmp_path: Path, cli: Callable[..., Any]) -> None:
     cli(*build, "--out", again, *words)
     for name in ("mirrors.csv", "shell_a.stl"):
         assert (again / name).read_bytes() == (out / name).read_bytes()
-    assert "clay" in cli(*asked, "--for-process", "clay", code=2).err
+    assert "clay" in cli(*asked, "--process", "clay", code=2).err
 
 
 def inserts() -> Process:

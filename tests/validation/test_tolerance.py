@@ -15,7 +15,8 @@ from scipy.spatial.transform import Rotation
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.reflection import miss_distances
 from tbcad.light.simulate.scene.reflector import reflectors
-from tbcad.tolerancing.montecarlo.builds import CoverageCase, as_made, scaled, simulate
+from tbcad.tolerancing.as_made import as_made
+from tbcad.tolerancing.montecarlo.builds import CoverageCase, scaled, simulate
 from tbcad.tolerancing.montecarlo.coverage import mirror_coverage, pointing
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, draw
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModel, EdgeModels, edge_models

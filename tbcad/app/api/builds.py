@@ -18,7 +18,7 @@ from tbcad.options.call import keywords, silent
 from tbcad.options.checks import check_is_capture, check_is_export, check_is_folder
 
 if TYPE_CHECKING:
-    from tbcad_verify.report.as_made import AsMade
+    from tbcad_verify.report.as_made import AsMade, ProcessYield
     from tbcad_verify.report.report import Report
 
     from tbcad.app.whole_design import Design
@@ -82,7 +82,7 @@ def planned(options: BuildOptions) -> BuildPlan:
     parts = default_parts(spec) if asked is None else tuple(asked)
     check_lists(spec, parts)
     file = None if isinstance(options.spec, Spec) else options.spec
-    inputs = [*design_files(spec, file), *files_named(options.for_process)]
+    inputs = [*design_files(spec, file), *files_named(options.process)]
     check_replaceable(Path(options.out), "build", options.force, inputs)
     return BuildPlan(spec, parts, process)
 
@@ -110,13 +110,13 @@ def _asked_process(options: BuildOptions) -> Process | None:
     from tbcad.tolerancing.process.process import load_process
 
     if options.wanted_yield is not None:
-        if options.for_process is None:
+        if options.process is None:
             raise InputError(
-                f"--yield {options.wanted_yield:g} is of no use without --for-process: name a "
+                f"--yield {options.wanted_yield:g} is of no use without --process: name a "
                 "process, or leave --yield out"
             )
         check_yield(options.wanted_yield)
-    return None if options.for_process is None else load_process(options.for_process)
+    return None if options.process is None else load_process(options.process)
 
 
 def spec_for_process(plan: BuildPlan, options: BuildOptions) -> Spec:
@@ -152,6 +152,8 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
 
     The files are read back before they replace the old ones.
     """
+    from tbcad_verify.report.as_made import AsMade
+
     from tbcad.common.schedule import background_processes
     from tbcad.output.folder import replacing
 
@@ -169,6 +171,7 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
             export = write_export(
                 mirrors, folder, plan.parts, progress, submit, optional_prototype=optional
             )
+            printed = submit(_prototype_as_made, folder) if verify else None
         report = None
         if verify:
             cutter = plan.process.ball_mm if plan.process else None
@@ -176,7 +179,10 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
                 verification(folder, progress=progress, cutter=cutter),
                 folder=out,
                 note=export.note,
-                as_made=simulated.result() if simulated else None,
+                as_made=replace(
+                    simulated.result() if simulated else AsMade(),
+                    prototype=printed.result() if printed else None,
+                ),
             )
         progress("report")
         from tbcad.report.page.write import write_report
@@ -189,36 +195,55 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
 
 def _load_libraries() -> None:
     """Load what the background process works with."""
-    import tbcad.tolerancing.montecarlo.builds  # noqa: F401
+    import tbcad.tolerancing.as_made  # noqa: F401
 
 
 def _as_made(mirrors: MirrorDesign) -> AsMade:
     """Simulate a few builds of a design by every built-in process."""
     from tbcad.light.simulate.scene.reflector import reflectors
-    from tbcad.tolerancing.montecarlo.builds import as_made
+    from tbcad.tolerancing.as_made import as_made
 
     return as_made(reflectors(mirrors), mirrors.spec)
+
+
+def _prototype_as_made(folder: Path) -> ProcessYield | None:
+    """Simulate a few prototypes of a build, printed and calibrated.
+
+    None where there is none, or its files cannot be read: the verification says what is wrong.
+    """
+    from tbcad.light.simulate.scene.reflector import read_export
+    from tbcad.records.prototype import NAME
+    from tbcad.tolerancing.as_made import prototype_as_made
+
+    if not (folder / NAME).is_file():
+        return None
+    try:
+        return prototype_as_made(read_export(folder))
+    except InputError:
+        return None
 
 
 def as_made(
     exports: Path | str, progress: Progress = silent, detail: Progress = silent
 ) -> AsMade | None:
-    """Simulate a few copies of a build by every built-in process.
+    """Simulate a few builds of a folder's shells by every built-in process, and of its prototype.
 
-    None where no shell was built, or its record cannot be read.
+    None where its record cannot be read.
     """
+    from tbcad_verify.report.as_made import AsMade
+
     from tbcad.light.simulate.scene.reflector import read_export
-    from tbcad.tolerancing.montecarlo.builds import as_made as simulated
+    from tbcad.tolerancing.as_made import as_made as simulated
 
     folder = Path(exports)
-    if not (folder / "shell_a.stl").is_file():
-        return None
     progress("simulated builds by each process")
     try:
         export = read_export(folder)
     except InputError:  # the verification says what is wrong with it
         return None
-    return simulated(export.reflectors, export.spec, detail)
+    shells = (folder / "shell_a.stl").is_file()
+    found = simulated(export.reflectors, export.spec, detail) if shells else AsMade()
+    return replace(found, prototype=_prototype_as_made(folder))
 
 
 @keywords(ReportOptions)

@@ -26,7 +26,7 @@ def capture(options: CaptureOptions) -> LightField:
         The light field, in memory: for every pixel the ray it sees along and its colour.
 
     Raises:
-        InputError: export, object or lamps cannot be read, or the folder cannot be replaced.
+        InputError: build, object or lamps cannot be read, or the folder cannot be replaced.
     """
     photographs = photograph(options)
     from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory

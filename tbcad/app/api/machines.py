@@ -54,7 +54,7 @@ def simulate_run(options: SimulateRunOptions) -> Run:
         The run as it is read back; the build is in its folder, as truth.json.
 
     Raises:
-        InputError: export, process or object cannot be read, or the folder cannot be written.
+        InputError: build, process or object cannot be read, or the folder cannot be written.
     """
     exports, folder, file = Path(options.exports), Path(options.out), options.object_file
     check_is_export(exports)

@@ -80,7 +80,7 @@ def tolerance(options: ToleranceOptions) -> Analysis:
     """Simulate many builds by a manufacturing process, and find what limits their yield.
 
     Raises:
-        InputError: export or process cannot be read, or mirrors are planar.
+        InputError: build or process cannot be read, or mirrors are planar.
     """
     process, exports = checked_process(options), Path(options.exports)
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
@@ -126,12 +126,12 @@ def order(options: OrderOptions) -> dict[str, Any]:
     from tbcad.tolerancing.process.process import load_process
 
     check_yield(options.wanted)
-    process = load_process(options.chain)
+    process = load_process(options.process)
     check_replaceable(out, "order", options.force, (exports,))
     from tbcad.drawings.order_sheet import write_sheet
     from tbcad.mirror_limits.order import checked_export, write_order
 
-    export = checked_export(exports, process, options.chain)
+    export = checked_export(exports, process, options.process)
     with replacing(out, "order", options.force, (exports,)) as folder:
         record = write_order(export, process, options, folder)
         options.progress("page")

@@ -43,12 +43,27 @@ def _name(command: CommandInfo) -> str:
     return str(command.name or getattr(command.callback, "__name__", ""))
 
 
+RENAMED_OPTIONS = {"--for-process": "--process", "--chain": "--process"}  # as they were, and are
+
+
 class Plain(TyperCommand):
     """A command with help in plain text: option names and types of any length in 80 columns."""
 
     def __init__(self, *arguments: Any, **given: Any) -> None:
         """As TyperCommand, but without markup."""
         super().__init__(*arguments, **{**given, "rich_markup_mode": None})
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As TyperCommand, but with options under their former names too, each of which is told."""
+        return super().parse_args(ctx, list(map(_renamed, args)))
+
+
+def _renamed(word: str) -> str:
+    name, equals, value = word.partition("=")
+    if name not in RENAMED_OPTIONS:
+        return word
+    typer.echo(f"tbcad: {name} is called {RENAMED_OPTIONS[name]} now", err=True)
+    return f"{RENAMED_OPTIONS[name]}{equals}{value}"
 
 
 def add_examples(app: typer.Typer, words: tuple[str, ...] = ()) -> None:

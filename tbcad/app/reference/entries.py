@@ -167,7 +167,7 @@ def _section_entries(section: KeySection) -> Iterator[ReferenceEntry]:
             "unit": key.unit,
             "allowed": key.allowed,
         }
-        yield ReferenceEntry("key", key.name, _filled(facts), _ends(key.name))
+        yield ReferenceEntry("key", key.name, _filled(facts), (*_ends(key.name), *key.choices))
 
 
 def _ends(name: str) -> tuple[str, ...]:

@@ -37,6 +37,9 @@ UNITS = {
 TYPES = {int: "whole number", float: "number", bool: "true or false", str: "text"}
 
 
+WORDS = "one of several words"
+
+
 @dataclass(frozen=True)
 class Key:
     """One key of a design."""
@@ -47,6 +50,11 @@ class Key:
     unit: str  # empty where it has none
     allowed: str
     description: str  # one sentence or two
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The words that it may be, where it is one of several."""
+        return tuple(self.allowed.split(" or ")) if self.type == WORDS else ()
 
 
 @dataclass(frozen=True)
@@ -98,7 +106,7 @@ def _type(kind: Any) -> str:
         return "list"
     if get_origin(kind) is Literal:
         texts = all(isinstance(choice, str) for choice in get_args(kind))
-        return "one of several words" if texts else "whole number"
+        return WORDS if texts else "whole number"
     return TYPES[kind]
 
 

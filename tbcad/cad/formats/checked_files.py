@@ -1,4 +1,4 @@
-"""JSON and CSV files of an export, checked against pydantic models; tables and TOML written."""
+"""JSON and CSV files of a build, checked against pydantic models; tables and TOML written."""
 
 import csv
 import json

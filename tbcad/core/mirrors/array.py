@@ -272,7 +272,7 @@ def mirror_margins(spec: MirrorsSpec, mirrors: int) -> Floats:
     if len(own) not in (0, mirrors):
         raise SpecError(
             f"mirrors.own_margins_mm has {len(own)} margins, but a camera has {mirrors} mirrors: "
-            "leave them out by --set mirrors.own_margins_mm=[], or compute others by --for-process"
+            "leave them out by --set mirrors.own_margins_mm=[], or compute others by --process"
         )
     return own if len(own) else np.full(mirrors, spec.margin_mm)
 

@@ -12,11 +12,15 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 from pydantic import BeforeValidator, Field, model_validator
 
 from tbcad.core.spec.prototype import CapMaking, PrototypeSpec
-from tbcad.core.spec.section import AUTO, OR_AUTO, OrWord, Section, as_tuple, whole
+from tbcad.core.spec.section import AUTO, OR_AUTO, Entries, OrWord, Section, as_tuple, whole
 from tbcad.core.spec.sizes import OpticsSpec, with_sizes
 
 _Side: TypeAlias = Annotated[float, Field(ge=20, le=2000)]
-Bed: TypeAlias = Annotated[tuple[_Side, _Side, _Side], BeforeValidator(as_tuple)]
+Bed: TypeAlias = Annotated[
+    tuple[_Side, _Side, _Side],
+    BeforeValidator(as_tuple),
+    Entries(("width", "depth", "height")),
+]
 _HOLE_EDGE_MM = 1.0  # material that must stay on either side of a hole in a flange
 FIT: Any = "fit"  # value of camera.hfov_deg that follows from the mirrors
 MAX_HFOV = 170  # degrees
@@ -80,7 +84,7 @@ class MirrorsSpec(Section):
         (), max_length=MAX_MIRRORS
     )
     """The same for each mirror, in the order of one camera's, none below margin_mm; empty: every
-    mirror has margin_mm. tbcad build --for-process computes them."""
+    mirror has margin_mm. tbcad build --process computes them."""
     max_radius_widths: float = Field(30.0, ge=5, le=1000)
     """Largest radius in half widths l of the mirror; one that needs less curvature than this
     gets this radius, nearly flat, and sees more than it must."""

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from tbcad.core.spec.section import OrWord, Reason
+from tbcad.core.spec.section import Entries, OrWord, Reason
 from tbcad.errors import InputError, one_line
 
 _MAX_VALUE_LENGTH = 60
@@ -146,10 +146,13 @@ def validation_error(
 
 def _wrong_value(first: ErrorDetails, key: str, model: type[BaseModel]) -> str:
     field = dict(dotted_fields(model)).get(key)
-    entry = "".join(f"[{part}]" for part in first["loc"] if isinstance(part, int))
+    name = f"{key}{''.join(f'[{part}]' for part in first['loc'] if isinstance(part, int))}"
     value = "missing" if first["type"] == "missing" else short_text(first["input"])
     if field is None:  # in a table that may be left out, or in a list of tables
-        return f"{key}{entry} is {value}: {first['msg'].lower()}: change it"
+        return f"{name} is {value}: {first['msg'].lower()}: change it"
+    for entries in (one.names for one in field.metadata if isinstance(one, Entries)):
+        named = [name for place, name in enumerate(entries) if place in first["loc"]]
+        name = " of ".join([*named, key])
     permitted = allowed_text(field.annotation, field.metadata)
     reasons = "".join(f" ({one.text})" for one in field.metadata if isinstance(one, Reason))
-    return f"{key}{entry} is {value}, allowed is {permitted}{reasons}: change it"
+    return f"{name} is {value}, allowed is {permitted}{reasons}: change it"

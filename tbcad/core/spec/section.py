@@ -51,6 +51,13 @@ class Reason:
     text: str
 
 
+@dataclass(frozen=True)
+class Entries:
+    """Annotation of a key that is a list: what its entries are called, for the error message."""
+
+    names: tuple[str, ...]
+
+
 AUTO: Final[Any] = "auto"  # value of a key whose value tbcad chooses
 OR_AUTO = OrWord(AUTO)
 

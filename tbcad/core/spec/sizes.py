@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 
 from pydantic import BeforeValidator, Field
 
-from tbcad.core.spec.section import AUTO, Reason, Section, as_tuple
+from tbcad.core.spec.section import AUTO, Entries, Reason, Section, as_tuple
 
 if TYPE_CHECKING:
     from tbcad.core.spec.prototype import PrototypeSpec
@@ -24,6 +24,7 @@ Point: TypeAlias = Annotated[
         Annotated[float, Field(ge=-10_000, lt=0)],
     ],
     BeforeValidator(as_tuple),
+    Entries(("x", "y", "z")),
 ]
 Stretch: TypeAlias = Annotated[float, Field(ge=0.5, le=2.0)]
 # Angle between neighbouring directions, of n: an edge of the icosahedron in n parts.
@@ -73,7 +74,10 @@ class OpticsSpec(Section):
     semi_minor_mm: float = Field(100.0, ge=1, le=MAX_SEMI_MINOR)
     """Semi-minor axis of both ellipsoids, whose foci are the origin and a pinhole. Larger:
     mirrors farther away."""
-    stretch: Annotated[tuple[Stretch, Stretch], BeforeValidator(as_tuple)] = (1.0, 1.0)
+    stretch: Annotated[tuple[Stretch, Stretch], BeforeValidator(as_tuple), Entries(("x", "y"))] = (
+        1.0,
+        1.0,
+    )
     """Directions of the virtual cameras, stretched along x and y and brought back to the unit
     sphere; 1 and 1: those of the geodesic polyhedron, as the paper has them. Above 1: more of them
     near the horizon, fewer near the zenith, where mirrors have fewest pixels."""

@@ -39,7 +39,7 @@ def write_machine_scene(
 ) -> dict[str, Any]:
     """Write meshes and scenes into a folder that exists, and return what is in it.
 
-    InputError: the export has no shells.
+    InputError: the build has no shells.
     """
     (folder / MESHES).mkdir()
     facets, cameras = {}, {}

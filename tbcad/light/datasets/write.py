@@ -54,7 +54,7 @@ RAY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
 def write_dataset(
     folder: Path, source: LightField, scene: Scene | None, options: DatasetOptions
 ) -> dict[str, Any]:
-    """Write all files of an export into an empty folder, and return its record.
+    """Write all files of a build into an empty folder, and return its record.
 
     `scene` is the object of a simulated capture. InputError: a mirror is not in the capture, or
     none gives a camera.
@@ -79,8 +79,8 @@ def write_scene(
 ) -> dict[str, Any]:
     """Write scenes of the machine into an empty folder, and return their record.
 
-    `exports` is the export that the light field was captured with. InputError: the capture names no
-    object, or the export has other cameras or no shells.
+    `exports` is the build that the light field was captured with. InputError: the capture names no
+    object, or the build has other cameras or no shells.
     """
     if scene is None:
         raise InputError("the capture names no object, so there is none in the scene: capture one")
@@ -106,7 +106,7 @@ def _record(
 
 
 def _check_same_cameras(source: LightField, export: ExportedDesign) -> None:
-    """Refuse an export whose mirrors are not those of the capture."""
+    """Refuse a build whose mirrors are not those of the capture."""
     for reflector in export.reflectors:
         frame = source.frames.get(reflector.camera_id)
         if (
@@ -116,7 +116,7 @@ def _check_same_cameras(source: LightField, export: ExportedDesign) -> None:
             or not np.allclose(frame.mirrors.apex, reflector.mirrors.apex, atol=1e-6)
         ):
             raise InputError(
-                f"{export.folder} is not the export of this capture: its camera "
+                f"{export.folder} is not the build of this capture: its camera "
                 f"{reflector.camera_id} has other mirrors or pixels: name the one it was taken with"
             )
 

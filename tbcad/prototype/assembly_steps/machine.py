@@ -1,4 +1,4 @@
-"""A prototype as its export describes it: bodies, fasteners, list of parts; steps as planned."""
+"""A prototype as its build describes it: bodies, fasteners, list of parts; steps as planned."""
 
 import tomllib
 from collections.abc import Callable

@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 from pydantic import Field
-from tbcad_verify.report.as_made import NOT_MODELLED, AsMade, enough_bad
+from tbcad_verify.report.as_made import NOT_MODELLED, AsMade, ProcessYield, enough_bad
 from tbcad_verify.report.methods import KEY_FIGURES
 
 from tbcad.cad.formats.checked_files import Finite, Record, read_json
@@ -14,6 +14,7 @@ from tbcad.output.manifest import VERDICT
 
 STATES = {True: ("pass", "✔", "pass"), False: ("fail", "✘", "fail"), None: ("unknown", "?", "?")}
 NAMES = 12  # of checks that did not pass, in the headline
+PRINTABLE = "printable"  # the check of a part by the printer that the design names
 
 
 class CheckRow(Record):
@@ -74,29 +75,29 @@ def read_verdict(folder: Path) -> Verdict | None:
 def verdict_html(
     verdict: Verdict | None, as_made: AsMade | None, views: int, balls: int, target_mm: float
 ) -> Iterator[str]:
-    """The top of the page: as designed, and by what it can be made."""
+    """The top of the page: files, shells, prototype, as the command's three lines have them."""
     yield "<div class=verdicts>"
-    yield from _as_designed(verdict, views, balls, target_mm)
-    yield from _as_made(as_made, target_mm)
+    yield from _files(verdict, views, balls, target_mm)
+    yield from _shells(as_made, target_mm)
+    if balls:
+        yield from _prototype(verdict, as_made, target_mm)
     yield "</div>"
 
 
-def _as_designed(
-    verdict: Verdict | None, views: int, balls: int, target_mm: float
-) -> Iterator[str]:
+def _files(verdict: Verdict | None, views: int, balls: int, target_mm: float) -> Iterator[str]:
     if verdict is None:
-        yield "<div class='card unknown'><h2>As designed</h2><p class=big>? not verified</p>"
+        yield "<div class='card unknown'><h2>Files</h2><p class=big>? not verified</p>"
         yield "<p>Run <code>tbcad verify</code>, then <code>tbcad report</code> again.</p></div>"
         return
     state, sign, _ = STATES[verdict.passed]
-    yield f"<div class='card {state}'><h2>As designed</h2>"
+    yield f"<div class='card {state}'><h2>Files</h2>"
     yield f"<p class=big><span aria-hidden=true>{sign}</span> {state.upper()}</p>"
     every = (*verdict.checks, *verdict.programs)
     if verdict.passed:
         too = f", and so do the prototype's {balls} balls in place of the mirrors" if balls else ""
         yield (
-            f"<p>{views} virtual cameras see the whole object of {target_mm:g} mm{too}. "
-            f"{len(every)} checks were made on the files themselves.</p>"
+            f"<p>As designed {views} virtual cameras see the whole object of {target_mm:g} mm{too}."
+            f" {len(every)} checks were made on the files themselves.</p>"
         )
     yield from _key_figures(verdict)
     for text, wanted in (("Failed", False), ("Unknown", None)):
@@ -126,31 +127,64 @@ def _key_figures(verdict: Verdict) -> Iterator[str]:
     yield "</tbody></table>"
 
 
-def _as_made(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
-    yield "<div class=card><h2>Can be made</h2>"
+def _shells(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
+    """By which chains the shells can be made."""
     if as_made is None or not as_made.processes:
-        reason = as_made.reason if as_made else "no shell was built, or it was not verified"
-        yield f"<p>Not simulated: {escape(reason)}.</p></div>"
+        reason = (as_made and as_made.reason) or "no shell was built, or it was not verified"
+        yield "<div class='card unknown'><h2>Shells</h2>"
+        yield f"<p class=big>? not simulated</p><p>{escape(reason)}.</p></div>"
         return
+    good = [f"{one.process} {one.text}" for one in as_made.processes if one.is_good]
+    state, sign, _ = STATES[bool(good)]
+    yield f"<div class='card {state}'><h2>Shells</h2><p class=big>"
+    yield f"<span aria-hidden=true>{sign}</span> "
+    yield f"{escape(', '.join(good)) or 'no built-in process makes them'}</p>"
+    yield _yield_words(as_made.builds, target_mm)
+    yield _yields(as_made.processes)
     yield (
-        f"<p>Share of {as_made.builds} simulated builds, or fewer where "
-        f"{enough_bad(as_made.builds)} failed, whose every virtual camera sees {target_mm:g} mm, "
-        f"and the median of their minimum coverage:</p>"
-    )
-    yield "<table class=made><thead><tr><th>Process<th>Yield<th><th>Coverage</tr></thead><tbody>"
-    for one in as_made.processes:
-        yield (
-            f"<tr><th>{escape(one.process)}<td class=n>{one.share:.0%} of {one.builds}"
-            f"<td class=bar><meter min=0 max=1 value={one.share:.3f} "
-            f"aria-label='yield of {escape(one.process, quote=True)}'>{one.share:.0%}</meter>"
-            f"<td class=n>{one.coverage_mm:.2f} mm</tr>"
-        )
-    yield "</tbody></table>"
-    yield (
-        "<p class=note>Larger margins give larger yields: <code>tbcad build --for-process</code>; "
+        "<p class=note>Larger margins give larger yields: <code>tbcad build --process NAME</code>; "
         "causes: <code>tbcad tolerance</code>.</p>"
     )
     yield f"<p class=note>Left out: {NOT_MODELLED}.</p></div>"
+
+
+def _prototype(verdict: Verdict | None, as_made: AsMade | None, target_mm: float) -> Iterator[str]:
+    """How many calibrated prototypes are good, and what the printer cannot make."""
+    made = as_made.prototype if as_made else None
+    parts = [one for one in verdict.checks if one.name == PRINTABLE] if verdict else []
+    failed = [one for one in parts if one.passed is not True]
+    good = None if made is None or not parts else made.is_good and not failed
+    state, sign, _ = STATES[good]
+    yield f"<div class='card {state}'><h2>Prototype</h2><p class=big>"
+    yield f"<span aria-hidden=true>{sign}</span> "
+    yield "not simulated</p>" if made is None else f"{made.text} good once calibrated</p>"
+    if as_made and made:
+        yield _yield_words(as_made.builds, target_mm)
+        yield _yields([made])
+    if parts and not failed:
+        yield f"<p>The printer of the design makes all {len(parts)} printed parts.</p>"
+    for one in failed:
+        yield f"<p>Its printer cannot make {escape(one.file)}: {escape(one.detail)}.</p>"
+    yield "</div>"
+
+
+def _yield_words(builds: int, target_mm: float) -> str:
+    return (
+        f"<p>Share of {builds} simulated builds, or fewer where {enough_bad(builds)} failed, whose "
+        f"every virtual camera sees {target_mm:g} mm, and the median of their minimum coverage:</p>"
+    )
+
+
+def _yields(yields: Sequence[ProcessYield]) -> str:
+    rows = (
+        f"<tr><th>{escape(one.process)}<td class=n>{one.share:.0%} of {one.builds}"
+        f"<td class=bar><meter min=0 max=1 value={one.share:.3f} "
+        f"aria-label='yield of {escape(one.process, quote=True)}'>{one.share:.0%}</meter>"
+        f"<td class=n>{one.coverage_mm:.2f} mm</tr>"
+        for one in yields
+    )
+    head = "<table class=made><thead><tr><th>Process<th>Yield<th><th>Coverage</tr></thead><tbody>"
+    return f"{head}{''.join(rows)}</tbody></table>"
 
 
 def checks_html(verdict: Verdict | None) -> Iterator[str]:

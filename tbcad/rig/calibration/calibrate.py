@@ -86,9 +86,9 @@ def prepared_setup(
     lens: CalibratedLens | None,
     geometry: Geometry = "prototype",
 ) -> Setup:
-    """The machine of an export as frames of a run, of a shell those of one camera, show it.
+    """The machine of a build as frames of a run, of a shell those of one camera, show it.
 
-    InputError: the export has no prototype or LEDs, or another picture's size than the run.
+    InputError: the build has no prototype or LEDs, or another picture's size than the run.
     """
     plan = plan_of(export, geometry, frames)
     machine = (
@@ -100,12 +100,12 @@ def prepared_setup(
         raise InputError(
             f"{export.folder} has a camera of {machine.camera.width_px} x "
             f"{machine.camera.height_px} pixels, the run's photographs have {size[0]} x {size[1]}: "
-            "name the export that was photographed"
+            "name the build that was photographed"
         )
     stops = len(plan.angle)
     if max(frame.stop for frame in frames) > stops:
         raise InputError(
-            f"the run has a stop beyond the {stops} of {export.folder}: name the export that was "
+            f"the run has a stop beyond the {stops} of {export.folder}: name the build that was "
             "photographed"
         )
     angle = np.radians([frame.base_angle_deg for frame in frames])
@@ -166,7 +166,7 @@ def ray_places(setup: Setup) -> tuple[tuple[str, ...], tuple[str, ...], Ints, In
                 ids.append(name)
                 places.append((frame, ball))
     if not places:
-        raise InputError("the run has no stop of the plan: name the export that was photographed")
+        raise InputError("the run has no stop of the plan: name the build that was photographed")
     frame, sphere = np.array(places).T
     return tuple(ids), tuple(absent), frame, sphere
 

@@ -151,7 +151,7 @@ def layouts(export: ExportedDesign, progress: Progress) -> list[Layout]:
 
 
 def led_room(export: ExportedDesign) -> LedRoom:
-    """Where LEDs may be on the stage of an export."""
+    """Where LEDs may be on the stage of a build."""
     stage = export.spec.prototype.stage
     part = load_parts()[stage.led]
     pillar = pillar_radius(stage, part)

@@ -85,7 +85,7 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
     """
     folder, exports, out = Path(options.run), Path(options.exports), Path(options.out)
     progress, detail = options.progress, options.detail
-    progress("run and export")
+    progress("run and build")
     process = load_process(options.process or DEFAULT_PROCESS, options.settings)
     run = read_run(folder)
     check_same_export(folder, run.record, exports)

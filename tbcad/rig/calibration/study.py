@@ -54,7 +54,7 @@ NOTES = (
 
 
 def calibration_study(export: ExportedDesign, progress: Progress) -> Study:
-    """The study of an export with a prototype."""
+    """The study of a build with a prototype."""
     progress("LEDs that tell most")
     placed = layouts(export, progress)
     progress("spheres alone")
@@ -175,7 +175,7 @@ def _seen(setup: Setup, machine: Machine, frames: Ints) -> tuple[Ints, Ints, Int
 
 
 def designed_setup(export: ExportedDesign) -> Setup:
-    """The prototype of an export with all frames of both runs, before it is photographed."""
+    """The prototype of a build with all frames of both runs, before it is photographed."""
     camera, frames = export.reflectors[0].camera, frames_of(read_plan(export).angle)
     return prepared_setup(export, frames, (camera.width_px, camera.height_px), None)
 

@@ -26,7 +26,7 @@ class Base:
     switch_s = 0.02  # two lines
 
     def __init__(self, grbl: Grbl, plan: ControlPlan) -> None:
-        """Drive a machine as its export says."""
+        """Drive a machine as its build says."""
         self._grbl, self._plan = grbl, plan
         self._offset: float | None = None
         self._at = plan.program.start.angle_deg
@@ -49,7 +49,7 @@ class Base:
         )
 
     def settings_that_differ(self) -> dict[int, tuple[float | None, float]]:
-        """Settings of the controller that are not the export's: by number, found and wanted.
+        """Settings of the controller that are not the build's: by number, found and wanted.
 
         A board without a setting is without what the setting switches off by zero.
         """
@@ -62,7 +62,7 @@ class Base:
         }
 
     def check_settings(self, note: Progress, *, send: bool) -> None:
-        """Compare the controller's settings with the export's; send what differs, or refuse."""
+        """Compare the controller's settings with the build's; send what differs, or refuse."""
         differing = self.settings_that_differ()
         if send:
             for number, (was, wanted) in differing.items():

@@ -1,4 +1,4 @@
-"""What an export says of a run: stops, lights, times, settings, and the motions of its program.
+"""What a build says of a run: stops, lights, times, settings, and the motions of its program.
 
 Pauses of the controller's program become questions to the operator, and what it does for each
 photograph is done by the run: a light, the camera, the light off again.
@@ -90,7 +90,7 @@ class Program:
 
 
 def read_program(folder: Path, firmware: Firmware) -> Program:
-    """The program of an export that tbcad build wrote for a firmware."""
+    """The program of a build that tbcad build wrote for a firmware."""
     words = _words(firmware)
     path = folder / words.file
     if not path.is_file():
@@ -149,7 +149,7 @@ def _matched(form: re.Pattern[str], line: str, what: str) -> re.Match[str]:
 
 @dataclass(frozen=True)
 class ControlPlan:
-    """All that a run needs of an export."""
+    """All that a run needs of a build."""
 
     sha256: dict[str, str]  # of each file that it depends on, by name
     size_px: tuple[int, int]  # columns and rows of the design's camera

@@ -1,4 +1,4 @@
-"""A whole run: export, port, camera and folder in, photographs out."""
+"""A whole run: build, port, camera and folder in, photographs out."""
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress

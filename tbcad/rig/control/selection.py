@@ -66,7 +66,7 @@ def chosen_phases(
     wrong = [name for name in named if name not in (*known, "leds")]
     if wrong:
         raise InputError(
-            f"--phases names {wrong[0]!r:.40}, this export has {', '.join(known)}: name some of "
+            f"--phases names {wrong[0]!r:.40}, this build has {', '.join(known)}: name some of "
             "these, or leds for all LEDs"
         )
     chosen = {phase.name: phase for phase in plan.phases if phase.name in named}

@@ -1,4 +1,4 @@
-"""One prototype: as an export describes it, and both runs as a machine's state has them."""
+"""One prototype: as a build describes it, and both runs as a machine's state has them."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -48,7 +48,7 @@ OTHER_STREAM = 2000
 
 
 def designed_prototype(export: ExportedDesign, plan: Plan) -> Machine:
-    """The prototype of an export; its frames are the stops of the first run, then of the second.
+    """The prototype of a build; its frames are the stops of the first run, then of the second.
 
     InputError: the record of the prototype cannot be read, or has no LEDs.
     """
@@ -93,7 +93,7 @@ def read_leds(folder: Path) -> Floats:
 
 
 def dome_radius(export: ExportedDesign) -> float:
-    """Radius of the domes of an export's LEDs, mm."""
+    """Radius of the domes of a build's LEDs, mm."""
     return float(load_parts()[export.spec.prototype.stage.led]["diameter_mm"]) / 2
 
 
@@ -115,7 +115,7 @@ def machine_run(
     if len(machine.radius) != len(plan):
         raise InputError(
             f"the machine has {len(machine.radius)} balls, {export.folder} has {len(plan)}: name "
-            "the export that the machine was calibrated with"
+            "the build that the machine was calibrated with"
         )
     balls = _balls(plan, machine, frames, TURNS[half])
     return prototype_run(export.reflectors[half], plan, half, machine.camera, balls)

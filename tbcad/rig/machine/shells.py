@@ -142,7 +142,7 @@ def random_half(export: ExportedDesign, half: int, errors: Errors, seed: int) ->
 
 
 def perfect_half(export: ExportedDesign, half: int) -> BuiltPrototype:
-    """One camera of an export's shell, built without errors: see `designed_half`."""
+    """One camera of a build's shell, built without errors: see `designed_half`."""
     machine = designed_half(export, half)
     grooves = export.reflectors[half].walls.flipped(_flip(half))
     walls = grooves.joined(_seam_and_foot(export, half))
@@ -165,11 +165,9 @@ def _flip(half: int) -> Floats:
 
 
 def export_of(calibration: Path) -> Path:
-    """The export that a calibration's record names; InputError: it names none."""
+    """The build that a calibration's record names; InputError: it names none."""
     files = [one / NAME for one in (calibration, *(calibration / name for name in CAMERAS))]
     try:
         return Path(CalibrationRecord.read(next(filter(Path.is_file, files), files[0])).exports)
     except InputError:
-        raise InputError(
-            f"{calibration} does not name its export: name it with --exports"
-        ) from None
+        raise InputError(f"{calibration} does not name its build: name it with --exports") from None

@@ -59,7 +59,7 @@ def _nearer(scene: Any | None, origin: Floats, direction: Floats, length: Floats
 
 
 def stage_scene(folder: Path) -> Any | None:
-    """The stage's printed parts of an export in their places; None where it has none."""
+    """The stage's printed parts of a build in their places; None where it has none."""
     parts = Prototype.read(folder / NAME).with_role("stage")
     facets = [_placed(folder, part) for part in parts]
     return embree_scene(np.concatenate(facets)) if facets else None

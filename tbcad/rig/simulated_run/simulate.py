@@ -67,7 +67,7 @@ BY_WEIGHT: dict[Geometry, tuple[str, ...]] = {
     "prototype": (StopRow.FILE, SagRow.FILE),
     "shell": (),
 }
-"""Files that it depends on too where an export has them."""
+"""Files that it depends on too where a build has them."""
 PNG_LEVEL = 1
 # Of a simulated camera there is no clock: photographs follow each other from here.
 BEGIN = datetime(2022, 11, 1, tzinfo=UTC)
@@ -79,9 +79,9 @@ Builds = tuple[tuple[BuiltPrototype, tuple[Frame, ...]], ...]
 def prepare_run(
     export: ExportedDesign, errors: Errors, subject: SceneObject, options: SimulateRunOptions
 ) -> tuple[tuple[SimulatedRun, ...], tuple[str, ...]]:
-    """A random build of an export before it is photographed, and the phases to photograph.
+    """A random build of a build before it is photographed, and the phases to photograph.
 
-    It is the prototype, or both cameras of the shell. InputError: the export has no prototype with
+    It is the prototype, or both cameras of the shell. InputError: the build has no prototype with
     LEDs, or a shell with planar mirrors, or has not the stops or phases asked for.
     """
     times = PhaseTimes(*exposures(options.exposure_leds, options.exposure_lit))

@@ -8,18 +8,14 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 from scipy.optimize import brentq
-from tbcad_verify.report.as_made import AsMade, ProcessYield, enough_bad
 
-from tbcad.core.spec.design import Spec
-from tbcad.errors import InputError
 from tbcad.light.simulate.parallel import chunks, in_threads
-from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.coverage import coverage, pointing
 from tbcad.tolerancing.montecarlo.draws import ShellDraws, WarpMaps, draw, shell_error_shapes
-from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models, warp_maps_of
+from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, warp_maps_of
 from tbcad.tolerancing.montecarlo.error_kinds import Error, Errors
-from tbcad.tolerancing.process.process import BUILT_IN, Process, load_process, process_errors
-from tbcad.types import Floats, Ints, Progress
+from tbcad.tolerancing.process.process import Process
+from tbcad.types import Floats, Ints
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -29,9 +25,6 @@ CONFIDENCE = 0.95  # probability that the true yield lies in the reported interv
 AnyResult = TypeVar("AnyResult", bound="DataclassInstance")
 Case: TypeAlias = Callable[[range], AnyResult]
 RunBatches: TypeAlias = Callable[[Any, Sequence[range]], list[Any]]
-BUILDS = 50  # by a process that may be good; others end when enough of them have failed
-AT_ONCE = 5
-SEED = 1
 
 
 @dataclass(frozen=True)
@@ -176,32 +169,6 @@ def yield_sentence(process: Process, worst: Floats, target: float) -> str:
 def percent(estimate: YieldEstimate) -> str:
     """A share with its interval."""
     return f"{estimate.share:.1%} ({estimate.low:.1%} to {estimate.high:.1%})"
-
-
-def as_made(
-    cameras: tuple[Reflector, Reflector], spec: Spec, detail: Progress = lambda _: None
-) -> AsMade:
-    """Simulate builds of both shells by every built-in process; the same answer every time."""
-    if not all((one.mirrors.curvature > 0).all() for one in cameras):
-        return AsMade(reason="the mirrors are planar")
-    models, yields = edge_models(cameras), []
-    for name in BUILT_IN:
-        detail(name)
-        yields.append(_process_yield(models, name, spec))
-    return AsMade(BUILDS, tuple(sorted(yields, key=lambda one: -one.coverage_mm)))
-
-
-def _process_yield(models: EdgeModels, name: str, spec: Spec) -> ProcessYield:
-    capture_mm = spec.optics.capture_diameter_mm
-    errors = process_errors(load_process(name), spec.mirrors.coating_um)
-    case, worst = CoverageCase(models, errors, SEED, worst_only=True), np.empty(0)
-    try:
-        while len(worst) < BUILDS and (worst < capture_mm).sum() < enough_bad(BUILDS):
-            worst = np.append(worst, simulate(case, AT_ONCE, first=len(worst)).worst)
-    except InputError:  # errors larger than the radius of a mirror
-        return ProcessYield(name, 0.0, 0.0, len(worst))
-    share = float((worst >= capture_mm).mean())
-    return ProcessYield(name, share, float(np.median(worst)), len(worst))
 
 
 WorstCoverage = Callable[[Errors], Floats]

@@ -30,7 +30,7 @@ from tbcad.core.optics.sphere_forms import (
 from tbcad.core.optics.windows import cell_windows
 from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, PrototypeRun, prototype_runs
 from tbcad.light.simulate.scene.reflector import Reflector
-from tbcad.tolerancing.montecarlo.builds import CoverageResult
+from tbcad.tolerancing.montecarlo.builds import CameraCoverage, CoverageResult
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
 from tbcad.tolerancing.montecarlo.draws import Shape, draw_kinds
 from tbcad.tolerancing.montecarlo.edge_model import ASYMMETRIC
@@ -223,6 +223,22 @@ class PrototypeCase:
 
 
 @dataclass(frozen=True)
+class CalibratedCase:
+    """The builds of `PrototypeCase`, but only what their virtual cameras cover once calibrated."""
+
+    model: PrototypeWindows
+    errors: Errors
+    seed: int
+
+    def __call__(self, builds: range) -> CameraCoverage:
+        """Coverage of the builds of these numbers."""
+        model = self.model
+        draws = draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.gravity)
+        rows = [_coverage(model, calibrated_poses(model, draws, k)) for k in range(len(draws))]
+        return CameraCoverage(np.array(rows))
+
+
+@dataclass(frozen=True)
 class RunPose:
     """Actual camera and balls of one run of one build, in the prototype's frame."""
 
@@ -294,6 +310,11 @@ def calibrated_pose(model: PrototypeWindows, half: int, pose: RunPose) -> RunPos
     return replace(pose, lens=lens)
 
 
+def calibrated_poses(model: PrototypeWindows, draws: PrototypeDraws, build: int) -> list[RunPose]:
+    """Both runs of one build with their windows moved to the actual balls."""
+    return [calibrated_pose(model, k, run_pose(model, draws, build, k)) for k in (0, 1)]
+
+
 def _shortest_rotations(start: Floats, end: Floats) -> Floats:
     """Matrices (m, 3, 3) that turn unit vectors (m, 3), as rows, onto others the shortest way."""
     axis = np.cross(start, end)
@@ -318,6 +339,11 @@ def prototype_result(model: PrototypeWindows, draws: PrototypeDraws) -> Prototyp
 
 
 def _seen(model: PrototypeWindows, poses: list[RunPose]) -> tuple[Floats, Floats]:
+    rays = zip(map(_middle_rays, model.runs, poses), model.designed_rays, strict=True)
+    return _coverage(model, poses), np.concatenate([_offsets(*pair) for pair in rays])
+
+
+def _coverage(model: PrototypeWindows, poses: list[RunPose]) -> Floats:
     misses = [
         minimum_miss_distances(
             *((run.side, run.first), run.outward),
@@ -327,8 +353,7 @@ def _seen(model: PrototypeWindows, poses: list[RunPose]) -> tuple[Floats, Floats
     ]
     diameter = np.full(int(model.virtual.max()) + 1, np.inf)
     np.minimum.at(diameter, model.virtual, 2 * np.concatenate(misses))
-    rays = zip(map(_middle_rays, model.runs, poses), model.designed_rays, strict=True)
-    return diameter, np.concatenate([_offsets(*pair) for pair in rays])
+    return diameter
 
 
 def _middle_rays(run: RunWindows, pose: RunPose) -> tuple[Floats, Floats]:

@@ -24,7 +24,7 @@ def test_build_verifies_and_verify_agrees(tmp_path: Path, cli: Command) -> None:
     """The camera of the paper does not hold the mirrors of n = 6; a wider one does."""
     out = tmp_path / "exports"
     shown = cli(*WIDE, "--out", out)
-    assert shown.out.startswith("PASS: ")
+    assert shown.out.startswith("Files: PASS, ")
     assert "Can be made (" in shown.out
     assert len(shown.out.splitlines()) <= MAX_LINES
     assert "Traceback" not in shown.err
@@ -41,7 +41,7 @@ def test_failed_verification_keeps_the_files_and_names_mirrors(
     out = tmp_path / "paper"
     paper = ["--n", "9", "--radius-rule", "paper", *SENSOR]
     shown = cli("build", *paper, *SHELL, "--out", out, code=1).out
-    assert shown.startswith("FAIL: ")
+    assert shown.startswith("Files: FAIL, ")
     assert "virtual cameras see less than 60 mm" in shown
     assert "coverage, facets" in shown
     assert "mirrors.radius_rule traced" in shown

@@ -13,7 +13,7 @@ import tbcad_verify
 from tbcad_verify.report.methods import method_of
 
 import tbcad.app.cli  # noqa: F401 - adds all commands
-from tbcad.app.cli.help_texts import HEADINGS, examples
+from tbcad.app.cli.help_texts import HEADINGS, RENAMED_OPTIONS, examples
 from tests.app.cli.commands import Command, Words, commands, leaves, long_name, options
 
 WIDE = "2000"  # columns: no line of help is broken
@@ -79,7 +79,16 @@ def test_an_option_is_called_and_takes_the_same_everywhere() -> None:
         assert ("--json" in names) != (words[0] in WITHOUT_FIGURES), words
     assert {name for name, found in kinds.items() if len(found) > 1} == SEVERAL_KINDS
     spelled = {name for one in leaves().values() for opt in options(one) for name in opt.opts}
-    assert {"--timeout", "--time-limit", "--for-process", "--process"} <= spelled  # old names
+    assert {"--timeout", "--time-limit", "--process"} <= spelled
+    assert not spelled & RENAMED_OPTIONS.keys()
+
+
+def test_former_names_of_options_are_told_and_still_taken(cli: Command) -> None:
+    """For a release."""
+    said = cli("build", "--for-process", "cnc", "--yield", "2", code=2).err
+    assert said.startswith("tbcad: --for-process is called --process now\ntbcad: --yield 2")
+    said = cli("order", "no-such-folder", "--chain=cnc", code=2).err
+    assert said.startswith("tbcad: --chain is called --process now\n")
 
 
 def test_a_study_as_json(cli: Command, tmp_path: Path) -> None:

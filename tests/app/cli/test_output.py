@@ -44,7 +44,10 @@ def test_outputs_of_verify(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli:
     monkeypatch.chdir(tmp_path)
     quiet = cli("verify", "x", "--quiet")
     assert quiet.err == ""
-    assert quiet.out == "PASS: as designed, 89 virtual cameras see 20 mm or more\n"
+    assert quiet.out == (
+        "Files: PASS, as designed 89 virtual cameras see 20 mm\n"
+        "Shells: yield not simulated: the mirrors are planar\n"
+    )
     full = cli("verify", "x", "--full").out
     assert quiet.out in full
     assert "object clearance" in "\n".join(fits(full))

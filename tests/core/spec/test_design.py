@@ -23,9 +23,11 @@ from tbcad.prototype.balls.catalogue import load_grades
 KEYS = {key: field for key, field in dotted_fields(Spec) if section_of(field) is None}
 REFUSED = {
     "n=4.0": "optics.n is 4.0, allowed is a whole number from 2 to 60",
-    "stretch=[3, 1]": "stretch[0] is 3, allowed is two numbers in brackets, each",
-    "stretch=[1]": "stretch[1] is missing, allowed is two numbers in brackets, each",
+    "stretch=[3, 1]": "x of optics.stretch is 3, allowed is two numbers in brackets, each",
+    "stretch=[1]": "y of optics.stretch is missing, allowed is two numbers in brackets, each",
     "stretch=1.2,1.3": "stretch is '1.2,1.3', allowed is two numbers in brackets, each",
+    "bed_mm=[99, -1, 99]": "depth of printer.bed_mm is -1, allowed",
+    "camera_mm=[5, 5, 5]": "z of optics.camera_mm is 5, allowed",
     "camera_mm=[0, 0, -1]": "three numbers in brackets: above 0 to 10000, from -10000 ",
     "own_margins_mm=[21]": "allowed is numbers in brackets, each from 0 to 20: change",
     "grade=G11": "allowed is G3 or G5",

@@ -95,7 +95,7 @@ def test_what_takes_too_long_is_unknown(good: Path) -> None:
     assert {check.name.partition(" ")[0] for check in lost} == {"step"}
     assert {check.file for check in lost} == {"shell_a.step", "shell_b.step", "lamp_ring.step"}
     assert not report.passed
-    assert report.verdict.startswith("FAIL: unknown: step solid")
+    assert report.verdict.startswith("Files: FAIL, unknown: step solid")
 
 
 def test_exit_statuses(good: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -103,7 +103,7 @@ def test_exit_statuses(good: Path, tmp_path: Path, capsys: pytest.CaptureFixture
     mesh(dented)(folder)
     sign(folder)
     assert main([str(folder), "-q"]) == 1
-    assert capsys.readouterr().out.startswith("FAIL: failed: centre error")
+    assert capsys.readouterr().out.startswith("Files: FAIL, failed: centre error")
     (folder / "shell_b.step").unlink()
     assert main([str(folder), "-q"]) == 2
     out = capsys.readouterr()

@@ -38,9 +38,9 @@ def test_edited_paper_is_told_and_refused_only_strictly(
         change(folder, name, edited_pdf if name.endswith(".pdf") else tied_list)
     assert main([str(folder), "-q"]) == 0
     verdict, line = capsys.readouterr().out.splitlines()
-    assert verdict.startswith("PASS")
+    assert verdict.startswith("Files: PASS")
     assert line.startswith("changed since the build: assembly.pdf, bom.csv, camera.json, ")
     assert main([str(folder), "-q", "--strict"]) == 1
-    assert capsys.readouterr().out == "FAIL: failed: paper\n"
+    assert capsys.readouterr().out == "Files: FAIL, failed: paper\n"
     change(folder, "plate_holes.csv", lambda data: data + b"\n")
     assert main([str(folder), "-q"]) in (1, 2)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from tbcad_verify.report.as_made import AsMade, ProcessYield
-from tbcad_verify.report.checks import Check
+from tbcad_verify.report.checks import Check, at_most
 from tbcad_verify.report.methods import KEY_FIGURES
 from tbcad_verify.report.report import Report
 from tbcad_verify.run.verify import verify
@@ -41,11 +41,16 @@ def long_report(shell_report: Report) -> Report:
         for one in KEY_FIGURES
         if one.check not in known
     )
+    more += tuple(at_most(("printable", f"{k}.stl", "problems"), 0, 0) for k in "ab")
     return replace(
         shell_report,
         checks=shell_report.checks + more,
         balls=16,
         seconds=1234.5,
-        as_made=AsMade(50, tuple(ProcessYield(*one) for one in YIELDS)),
+        as_made=AsMade(
+            50,
+            tuple(ProcessYield(*one) for one in YIELDS),
+            prototype=ProcessYield("fdm", 0.8, 59.91, 15),
+        ),
         note="No prototype: " + "it reaches into the light, and there is no place for it; " * 3,
     )

@@ -87,7 +87,7 @@ def test_command_line(sample_folder: Path) -> None:
         env={"PYTHONPATH": str(Path(tbcad_verify.__file__).parents[1])},
     )
     assert run.returncode == 0, run.stderr
-    assert run.stdout.startswith("PASS: as designed, 89 virtual cameras see 20 mm or more\n")
+    assert run.stdout.startswith("Files: PASS, as designed 89 virtual cameras see 20 mm\n")
     assert run.stderr.splitlines()[-1].endswith(" s] verify: STEP")
     assert "\x1b" not in run.stdout
 
@@ -159,10 +159,10 @@ def test_changed_paper_is_told_and_fails_only_strictly(
     assert failed(report) == set()
     assert json.loads(summary_json(report))["changed"] == ["camera.json"]
     report.show(Console(width=80))
-    assert capsys.readouterr().out.splitlines()[1] == "changed since the build: camera.json"
+    assert capsys.readouterr().out.splitlines()[2] == "changed since the build: camera.json"
     strict = replace(report, checks=tuple(strictly(report.checks)))
     assert failed(strict) == {"paper"}
-    assert strict.verdict == "FAIL: failed: paper"
+    assert strict.verdict == "Files: FAIL, failed: paper"
     assert detail(strict, "paper") == "changed since the build: camera.json"
     assert all(check.passed for check in strictly(manifest_of(sign(export_folder))))
 

@@ -1,4 +1,4 @@
-"""What people see: at most thirteen lines of 80 columns, and rows with words from outside."""
+"""What people see: at most fourteen lines of 80 columns, and rows with words from outside."""
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ def broken(
 def test_pass_of_a_shell(shell_report: Report) -> None:
     lines = fits(shown(shell_report))
     assert len(lines) <= MAX_LINES
-    assert lines[0] == "PASS: as designed, 89 virtual cameras see 40 mm or more"
+    assert lines[0] == "Files: PASS, as designed 89 virtual cameras see 40 mm"
     text = " ".join(lines)
     figures = {one.label: check for one, check in key_figures(shell_report)}
     assert {"coverage, spheres", "coverage, facets", "pixels blocked"} <= figures.keys()
     assert all(label in text for label in figures)
     assert f"{figures['coverage, spheres'].measured:.4g} >= 40 mm" in text
-    assert "Can be made: tbcad tolerance FOLDER" in text
+    assert "Shells: tbcad tolerance FOLDER" in text
     assert " s; files, and every check in verify.json" in lines[-1]
 
 
@@ -76,9 +76,12 @@ def test_pass_with_all_there_is(long_report: Report) -> None:
     lines = fits(shown(replace(long_report, programs=asked)))
     assert len(lines) == MAX_LINES
     assert lines[0].endswith(", on 16 balls too")
-    assert "50 simulated builds, or until 3 fail:" in lines[-8]  # 47 of 50 are 94 %
-    assert lines[-7] == "  by: diamond 98% 60"
-    assert lines[-6] == "  not by: cnc 7/10 60, sla 0/5 51.4; more: --for-process"
+    assert lines[1] == "Shells: good by diamond 98%"
+    assert lines[2] == (
+        "Prototype: 12/15 good, printed by FDM, calibrated; its printer makes all 2 parts"
+    )
+    assert "50 simulated builds, or until 3 fail;" in lines[-7]  # 47 of 50 are 94 %
+    assert lines[-6] == "  diamond 98% 60, cnc 7/10 60, sla 0/5 51.4; prototype 12/15 59.9"
     assert "9 questions to other programs skipped" in lines[-4]
     assert lines[-3].startswith("No prototype: ")
     assert lines[-1] == "1234 s; files, and every check in verify.json: exports"
@@ -91,6 +94,25 @@ def test_solids_without_fillets_are_told(shell_report: Report, as_made: AsMade |
     valleys, grooves = (replace(shell_report, valleys=v, as_made=as_made) for v in (True, False))
     assert "fillets" in "".join(line for line in fits(shown(valleys)) if "solids" in line)
     assert "fillets" not in shown(grooves)
+
+
+def test_parts_that_the_printer_cannot_make_are_counted(long_report: Report) -> None:
+    files = {one.file for one in long_report.checks if one.name == "printable"}
+    lines = fits(shown(broken(long_report, lambda check: check.file == "a.stl")))
+    assert lines[0] == "Files: FAIL, failed: printable"
+    assert lines[2].endswith(f"; 1 of {len(files)} parts unprintable")
+
+
+def test_no_process_and_no_simulation_are_said(long_report: Report) -> None:
+    bad = (ProcessYield("fdm", 0.0, 42, 5), ProcessYield("cnc", 0.8, 59.98, 15))
+    for made, said in (
+        (AsMade(50, bad), "good by no built-in process; best: cnc 12/15"),
+        (AsMade(50, reason="the mirrors are planar"), "yield not simulated: the mirrors are"),
+        (None, "tbcad tolerance FOLDER simulates builds"),
+    ):
+        lines = fits(shown(replace(long_report, as_made=made)))
+        assert lines[1].startswith(f"Shells: {said}")
+        assert lines[2].startswith("Prototype: yield not simulated; its printer makes all")
 
 
 def test_every_key_figure_has_room(long_report: Report) -> None:
@@ -107,8 +129,8 @@ def test_failures_fit(long_report: Report, every: int, state: bool | None) -> No
     report = broken(long_report, lambda check: check.name in names, state)
     lines = fits(shown(report))
     assert len(lines) <= MAX_LINES
-    assert lines[0].startswith("FAIL: ")
-    assert fits(shown(report, "quiet")) == lines[:1]
+    assert lines[0].startswith("Files: FAIL, ")
+    assert fits(shown(report, "quiet")) == lines[:3]
     explained = [line for line in lines if line.startswith("- ")]
     rest = [line for line in explained if " more: " in line]
     counted = int(rest[0].split()[1]) if rest else 0
@@ -118,9 +140,9 @@ def test_failures_fit(long_report: Report, every: int, state: bool | None) -> No
 def test_the_worst_comes_first_and_remedies_are_shared(shell_report: Report) -> None:
     names = ("watertight", "manifest", "coverage, facets", "coverage, spheres", "poses", "folds")
     lines = fits(shown(broken(shell_report, lambda check: check.name in names)))
-    assert lines[1].startswith("- coverage, spheres:")
-    assert lines[2].startswith("- coverage, facets:")
-    assert lines[3] == f"    -> {remedy_by_name('coverage, facets')}"
+    assert lines[2].startswith("- coverage, spheres:")
+    assert lines[3].startswith("- coverage, facets:")
+    assert lines[4] == f"    -> {remedy_by_name('coverage, facets')}"
     assert "3 more: poses; watertight; folds" in " ".join(lines)
 
 
@@ -201,9 +223,9 @@ def test_json_keys_are_documented() -> None:
 
 
 def test_colour_is_for_terminals(shell_report: Report) -> None:
-    assert shown(shell_report, terminal=True).startswith("\x1b[1;32mPASS")
+    assert shown(shell_report, terminal=True).startswith("Files: \x1b[1;32mPASS")
     failing = broken(shell_report, lambda check: check.name == "manifest")
-    assert shown(failing, terminal=True).startswith("\x1b[1;31mFAIL")
+    assert shown(failing, terminal=True).startswith("Files: \x1b[1;31mFAIL")
 
 
 def test_every_remedy_fits() -> None:

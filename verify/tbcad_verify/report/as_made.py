@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 NOT_MODELLED = "lens 2 mm, shadows"
 """By no simulated build; the figure is of the paper's design: docs/tolerance.md has them all."""
 MOST, NEAREST = 3, 2  # processes that can, and that cannot, of which the verdict tells
 GOOD = 0.95  # share of few builds that stands for a process that can make a design
-NOT_SIMULATED = "Can be made: tbcad tolerance FOLDER simulates builds with manufacturing errors"
+NOT_SIMULATED = "tbcad tolerance FOLDER simulates builds with manufacturing errors"
+FILLETS = "a cutter's fillets, rounding of ridges"
+WIDEST = 80  # columns of a line
+FEW = 50
 
 
 @dataclass(frozen=True)
@@ -20,15 +24,28 @@ class ProcessYield:
     coverage_mm: float  # median of the builds' minimum coverage
     builds: int  # as many as asked for, or fewer where enough had failed
 
+    @property
+    def is_good(self) -> bool:
+        """Whether the process can make the design."""
+        return self.share >= GOOD
+
+    @property
+    def text(self) -> str:
+        """The yield in words: as a percentage where all builds were simulated, else counted."""
+        if self.is_good:
+            return f"{self.share:.0%}"
+        return f"{self.share * self.builds:.0f}/{self.builds}"
+
 
 @dataclass(frozen=True)
 class AsMade:
     """Simulated builds of one design, without any new search for its margin."""
 
-    builds: int = 0  # by each process at most: `enough_bad` ones end them
-    # the largest coverage first; empty if they could not be simulated
+    builds: int = FEW  # by each process at most: `enough_bad` ones end them
+    # of both shells, the largest coverage first; empty if they could not be simulated
     processes: tuple[ProcessYield, ...] = ()
     reason: str = ""  # why not
+    prototype: ProcessYield | None = None  # of printed and calibrated prototypes
 
 
 def enough_bad(builds: int) -> int:
@@ -36,26 +53,57 @@ def enough_bad(builds: int) -> int:
     return int(builds * (1 - GOOD) + 1e-9) + 1
 
 
-def as_made_lines(as_made: AsMade | None, valleys: bool) -> list[str]:
-    """The same in words, and what the solids have not, where mirrors meet in valleys.
-
-    Without simulated builds: the command that makes them.
-    """
-    fillets = ["Left out of the solids: a cutter's fillets, rounding of ridges"] * valleys
+def shells_line(as_made: AsMade | None) -> str:
+    """Which chains make the shells, and at what yield."""
     if as_made is None:
-        return [NOT_SIMULATED, *fillets]
+        return f"Shells: {NOT_SIMULATED}"
     if not as_made.processes:
-        return [f"Can be made: not simulated, {as_made.reason}", *fillets]
-    good: list[str] = []
-    others: list[str] = []
-    for one in as_made.processes:
-        is_good, count = one.share >= GOOD, f"{one.share * one.builds:.0f}/{one.builds}"
-        words = f"{one.process} {f'{one.share:.0%}' if is_good else count} {one.coverage_mm:.3g}"
-        (good if is_good else others).append(words)
-    return [
-        f"Can be made ({as_made.builds} simulated builds, or until "
-        f"{enough_bad(as_made.builds)} fail: yield, median minimum in mm)",
-        f"  by: {', '.join(good[:MOST]) or 'none of the built-in processes'}",
-        *([f"  not by: {', '.join(others[:NEAREST])}; more: --for-process"] if others else []),
-        f"  left out: {NOT_MODELLED}{'; fillets, ridges not in solids' * valleys}",
-    ]
+        return f"Shells: yield not simulated: {as_made.reason or 'the record cannot be read'}"
+    good = [f"{one.process} {one.text}" for one in as_made.processes if one.is_good]
+    if good:
+        return f"Shells: good by {', '.join(good[:MOST])}"
+    best = max(as_made.processes, key=lambda one: (one.share, one.coverage_mm))
+    return f"Shells: good by no built-in process; best: {best.process} {best.text}"
+
+
+def prototype_line(as_made: AsMade | None, parts: int, unprintable: int) -> str:
+    """The yield of calibrated prototypes, and how many of its parts its printer cannot make."""
+    printer = f"its printer makes all {parts} parts"
+    if unprintable:
+        printer = f"{unprintable} of {parts} parts unprintable"
+    made = as_made.prototype if as_made else None
+    if made is None:
+        return f"Prototype: yield not simulated; {printer}"
+    return f"Prototype: {made.text} good, printed by {made.process.upper()}, calibrated; {printer}"
+
+
+def as_made_lines(as_made: AsMade | None, target_mm: float, valleys: bool) -> Iterator[str]:
+    """Yield and median coverage of each, and what the solids lack where mirrors meet in valleys."""
+    if as_made is None or not (as_made.processes or as_made.prototype):
+        yield from [f"Left out of the solids: {FILLETS}"] * valleys
+        return
+    fail = enough_bad(as_made.builds)
+    yield (
+        f"Good: all see {target_mm:g} mm. {as_made.builds} simulated builds, or until "
+        f"{fail} fail; median minimum, mm:"
+    )
+    yield _medians(as_made)
+    yield f"  left out: {NOT_MODELLED}{'; fillets, ridges not in solids' * valleys}"
+
+
+def _medians(as_made: AsMade) -> str:
+    """As many processes as a line has room for, the good ones first, and the prototype."""
+    good = [one for one in as_made.processes if one.is_good][:MOST]
+    others = [one for one in as_made.processes if not one.is_good][:NEAREST]
+    shown = [*good, *others]
+    ends = [f"prototype {_median(made)}"] if (made := as_made.prototype) else []
+    for count in range(len(shown), -1, -1):
+        shells = ", ".join(f"{one.process} {_median(one)}" for one in shown[:count])
+        line = "  " + "; ".join(filter(None, [shells, *ends]))
+        if len(line) <= WIDEST:
+            break
+    return line
+
+
+def _median(made: ProcessYield) -> str:
+    return f"{made.text} {made.coverage_mm:.3g}"

@@ -15,7 +15,7 @@ from rich.console import Console
 
 from tbcad_verify.record.mirrors import Mirrors
 from tbcad_verify.record.poses import virtual_cameras
-from tbcad_verify.report.as_made import AsMade
+from tbcad_verify.report.as_made import AsMade, ProcessYield, prototype_line, shells_line
 from tbcad_verify.report.checks import Check, finite
 from tbcad_verify.report.methods import key_figures, remedy
 from tbcad_verify.report.text import (
@@ -33,7 +33,8 @@ DIGITS = 9
 LIMIT_DIGITS = 12  # significant
 NAME = "verify.json"
 SCHEMA = "tbcad-verify-summary/1"
-BEGIN = "FAIL: "
+BEGIN = "Files: FAIL, "
+PRINTABLE = "printable"  # the check of a part by the printer that the design names
 STATES = (("failed", False), ("unknown", None))
 Output = Literal["summary", "full", "quiet", "json"]
 
@@ -83,8 +84,21 @@ class Report:
 
     @property
     def verdict(self) -> str:
-        """One line: PASS or FAIL, and what decides it."""
+        """One line on the files: PASS or FAIL, and what decides it."""
         return _pass_line(self) if self.passed else _fail_line(self)
+
+    @property
+    def verdict_lines(self) -> list[str]:
+        """The verdict on the files, then whether shells and prototype can be made."""
+        parts = [check for check in self.checks if check.name == PRINTABLE]
+        shells = [shells_line(self.as_made)] if self.shell else []
+        printed = prototype_line(self.as_made, len(parts), len(self.unprintable))
+        return [self.verdict, *shells, *([printed] if self.balls else [])]
+
+    @property
+    def unprintable(self) -> list[str]:
+        """STL files of the prototype's parts that its printer cannot make."""
+        return [one.file for one in self.checks if one.name == PRINTABLE and not one.passed]
 
     def names_of(self, state: bool | None) -> list[str]:
         """Names of the checks that passed (True), failed (False) or are unknown (None)."""
@@ -125,7 +139,7 @@ class Report:
     def show(self, console: Console, output: Output = "summary") -> None:
         """Print the result.
 
-        `output`: "summary" (at most thirteen lines), "full" (every check before it), "quiet" (the
+        `output`: "summary" (at most fourteen lines), "full" (every check before it), "quiet" (the
         verdict, and what was changed), or "json" (the summary for other programs).
         """
         if output == "full":
@@ -134,7 +148,8 @@ class Report:
             for line in summary(self):
                 console.print(line, highlight=False, soft_wrap=True)
         else:
-            lines = [self.verdict, *changed_lines(self.checks)]
+            verdict = self.verdict_lines if self.as_made else [self.verdict]
+            lines = [*verdict, *changed_lines(self.checks)]
             text = "\n".join(lines) if output == "quiet" else summary_json(self)
             console.print(text, markup=False, highlight=False, soft_wrap=True)
 
@@ -188,12 +203,12 @@ def _rounded(value: float | None) -> float | int | None:
 
 
 def _pass_line(report: Report) -> str:
-    sees = f"{report.target_mm:g} mm or more"
+    sees = f"see {report.target_mm:g} mm"
     if not report.shell:
-        return f"PASS: as designed, every mirror sees {sees} on {report.balls} balls; no shell"
+        return f"Files: PASS, as designed all mirrors {sees} on {report.balls} balls; no shell"
     count = virtual_cameras(report.mirrors).count
     too = f", on {report.balls} balls too" if report.balls else ""
-    return f"PASS: as designed, {count} virtual cameras see {sees}{too}"
+    return f"Files: PASS, as designed {count} virtual cameras {sees}{too}"
 
 
 def _fail_line(report: Report) -> str:
@@ -260,13 +275,19 @@ def _as_made(report: Report) -> dict[str, Any] | None:
     as_made = report.as_made
     if as_made is None:
         return None
-    processes = [
-        {
-            "process": one.process,
-            "yield": one.share,
-            "builds": one.builds,
-            "coverage_mm": one.coverage_mm,
-        }
-        for one in as_made.processes
-    ]
-    return {"builds": as_made.builds, "processes": processes, "reason": as_made.reason or None}
+    made = as_made.prototype
+    return {
+        "builds": as_made.builds,
+        "processes": [_yield(one) for one in as_made.processes],
+        "prototype": made and _yield(made),
+        "reason": as_made.reason or None,
+    }
+
+
+def _yield(one: ProcessYield) -> dict[str, Any]:
+    return {
+        "process": one.process,
+        "yield": one.share,
+        "builds": one.builds,
+        "coverage_mm": one.coverage_mm,
+    }

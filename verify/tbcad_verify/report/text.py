@@ -1,4 +1,4 @@
-"""Text for people, 80 columns wide: a summary of at most thirteen lines; every check; printers."""
+"""Text for people, 80 columns wide: a summary of at most fourteen lines; every check; printers."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tbcad_verify.report.report import Report
 
 WIDTH = 80  # columns of everything that is shown
+PASS_COLUMNS = 7, 11  # of the word PASS or FAIL in the first line
 MORE = " ..."
 PAPER = ("paper", "manifest.json", "files")
 CHANGED = "changed since the build: "
@@ -31,10 +32,9 @@ SIGNS = {AT_MOST: "<=", AT_LEAST: ">=", EXACTLY: "="}
 WIDTHS = (26, 7, 21, 23)
 SPAN_DIGITS = 3  # of the smallest and the largest of several figures
 INDENT = 4
-MAX_LINES = 13
+MAX_LINES = 14
 NOTE_LINES = 2  # of them, at most
 FAILURE_LINES = 6  # of them, at most
-AS_MADE_LINES = 2  # of them, where something failed: making it comes later
 COLUMN_GAP = "  "
 FigureRow = tuple[str, str, str]  # label, figure, limit
 FAILURE_DIGITS = 6  # enough to tell a figure from the limit that it just misses
@@ -193,19 +193,21 @@ def _short(problem: str) -> str:
 
 
 def summary(report: Report) -> list[Text]:
-    """Verdict, changed files, failures with remedies, key figures, what making leaves, folder."""
-    failed = _failure_lines(report)
-    as_made = as_made_lines(report.as_made, report.valleys)[: AS_MADE_LINES if failed else None]
+    """Verdict, changed files, failures with remedies, key figures, medians of builds, folder."""
+    failed, verdict = _failure_lines(report), report.verdict_lines
+    as_made = list(as_made_lines(report.as_made, report.target_mm, report.valleys))
+    if failed:  # making it comes later
+        as_made = []
     note = textwrap.wrap(report.note, WIDTH, max_lines=NOTE_LINES, placeholder=MORE)
     asked = sum(map(is_skipped, report.programs))
     skipped = [f"{asked} questions to other programs skipped: see --full"] if asked else []
     end = [*skipped, *note, _end_line(report)]
     changed = changed_lines(report.checks)
-    room = MAX_LINES - 1 - sum(map(len, (changed, failed, as_made, end)))
-    figures = _figure_lines(report, room)
-    verdict = Text(report.verdict)
-    verdict.stylize("bold green" if report.passed else "bold red", 0, len("PASS"))
-    return [verdict, *map(Text, (*changed, *failed, *figures, *as_made, *end))]
+    room = MAX_LINES - sum(map(len, (verdict, changed, failed, as_made, end)))
+    figures = _figure_lines(report, max(room, 0))
+    files, *others = map(Text, verdict)
+    files.stylize("bold green" if report.passed else "bold red", *PASS_COLUMNS)
+    return [files, *others, *map(Text, (*changed, *failed, *figures, *as_made, *end))]
 
 
 def _failure_lines(report: Report) -> list[str]:

@@ -1,4 +1,4 @@
-"""Simulate photographs, and export captures for other programs."""
+"""Simulate photographs, and write captures for other programs."""
 
 from collections.abc import Iterator
 from dataclasses import replace

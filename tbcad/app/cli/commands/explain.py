@@ -13,13 +13,14 @@ if TYPE_CHECKING:
     from tbcad.app.reference.entries import ReferenceEntry
 
 SCHEMA = "tbcad-explain/1"
-KINDS = ("term", "section", "key", "check")
+KINDS = ("term", "section", "key", "check", "process")
 INDENT = 13  # columns, of what stands behind a heading
 
 
 NameOption = Annotated[str | None, typer.Argument(metavar="NAME")]
-"""A term or symbol (theta1), a key of a design or its end (margin_mm), a column of a table
-(coverage_mm), or a check of the verification ("coverage, facets"); without it, all names."""
+"""A term or symbol (theta1), a key of a design or its end (margin_mm), a value of one (traced), a
+process (cnc), a column of a table (coverage_mm), or a check or figure of the verification
+("coverage, facets"); without it, all names."""
 
 
 @app.command()
@@ -34,7 +35,7 @@ def explain(
     """
     from tbcad.app.reference.entries import explained, terms_and_keys
 
-    entries = [*terms_and_keys(), *_checks()]
+    entries = [*terms_and_keys(), *_checks(), *_processes()]
     if name is None:
         names = {kind: _names(entries, kind) for kind in KINDS}
         print_result({"schema": SCHEMA, **names}, _lists(entries), json)
@@ -63,6 +64,19 @@ def _checks() -> "Iterator[ReferenceEntry]":
             yield ReferenceEntry("check", check, facts, (labels.get(check, check),))
 
 
+def _processes() -> "Iterator[ReferenceEntry]":
+    """The built-in processes, as each one's file describes it."""
+    from tbcad.app.reference.entries import ReferenceEntry
+    from tbcad.tolerancing.process.process import BUILT_IN, load_process
+
+    for name in BUILT_IN:
+        facts: dict[str, str | list[str]] = {
+            "meaning": load_process(name).title,
+            "used by": "tbcad build, tolerance and order with --process",
+        }
+        yield ReferenceEntry("process", name, facts)
+
+
 def _lines(entry: "ReferenceEntry") -> Iterator[str]:
     yield f"{entry.name} ({entry.kind})"
     for heading, value in entry.facts.items():
@@ -79,6 +93,7 @@ def _lists(entries: "list[ReferenceEntry]") -> Iterator[str]:
         keys = [key.name.rpartition(".")[2] for key in section.keys]
         yield _list(f"Keys of a design, [{section.name}]".replace(", []", ""), keys)
     yield _list("Checks of the verification", _names(entries, "check"))
+    yield _list("Processes", _names(entries, "process"))
     yield "tbcad explain NAME explains one of them."
 
 

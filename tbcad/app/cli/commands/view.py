@@ -32,6 +32,7 @@ from tbcad.options.shared import (
 )
 
 if TYPE_CHECKING:
+    from tbcad.common.screen import Stages
     from tbcad.core.optics.camera import Camera
     from tbcad.light.reconstruction.field import Field
     from tbcad.light.reflectance.environment import Environment
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from tbcad.light.simulate.scene.lamps import PointLights
     from tbcad.light.simulate.scene.ray_casting import Scene
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
-    from tbcad.types import Bytes, Progress
+    from tbcad.types import Bytes
 
 # Shadows of all lamps are traced for each ray of a pixel: fewer than in the built-in light.
 LIT_SAMPLES = 2
@@ -117,7 +118,7 @@ def view(
     _check_light(light, light_turn, light_format, chosen, frame)
     place = Query(azimuth, elevation, distance, width=width, height=height)
     wanted = None if light is None else read_environment(light, radians(light_turn), light_format)
-    with stages(3) as screen, LightField.open(capture_folder) as stored:
+    with stages(4) as screen, LightField.open(capture_folder) as stored:
         screen.stage("light field")
         source = stored if frame is None else sequence_frame(stored, capture_folder, frame)
         at = place.camera(source.capture_mm)
@@ -125,11 +126,11 @@ def view(
         relit = None if wanted is None else _relit(capture_folder, source, wanted)
         shown = tiles if relit is None else MirrorTiles(relit.field)
         made = wanted_field(asked if by_default else chosen, capture_folder, source, frame)
-        screen.stage("view")
         if made is not None:
+            screen.stage("view")
             picture, contents = _of_field(made, at)
         else:
-            picture, contents = _of_light_field((tiles, shown), at, chosen, screen.detail)
+            picture, contents = _of_light_field((tiles, shown), at, chosen, screen)
         for what, file in beside:
             data = contents[what + file.suffix.lower()]()
             replace_files(file.parent, {file.name: data})
@@ -237,7 +238,7 @@ def _of_field(made: "Field", at: "Camera") -> tuple["Bytes", Contents]:
 
 
 def _of_light_field(
-    fields: tuple["MirrorTiles", "MirrorTiles"], at: "Camera", method: str, progress: "Progress"
+    fields: tuple["MirrorTiles", "MirrorTiles"], at: "Camera", method: str, screen: "Stages"
 ) -> tuple["Bytes", Contents]:
     """The picture by nearest rays or by depth, and the depth that is found for it.
 
@@ -248,8 +249,12 @@ def _of_light_field(
 
     tiles, shown = fields
     if method == "nearest":
+        screen.stage("view")
         return synthesise(shown, at).image, {}
-    picture, found = depth_views(tiles, progress=progress).of(at, shown)
+    screen.stage("pictures of the virtual cameras")
+    views = depth_views(tiles, progress=screen.detail)
+    screen.stage("depth and view")
+    picture, found = views.of(at, shown)
     return picture.image, {"depth.png": found.png, "depth.ply": partial(found.ply, picture.image)}
 
 

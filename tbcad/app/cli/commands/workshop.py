@@ -22,7 +22,10 @@ LensesOption = Annotated[Path | None, typer.Option("--lenses", metavar="FILE")]
 def camera(
     design: Design[Path] = None,
     n: Annotated[
-        int | None, typer.Option(help="Subdivision of the icosahedron, 2 to 60; the paper has 18.")
+        int | None,
+        typer.Option(
+            "--n", "-n", help="Subdivision of the icosahedron, 2 to 60; the paper has 18."
+        ),
     ] = None,
     settings: Settings = None,
     cameras: CamerasOption = None,

@@ -1,4 +1,4 @@
-"""The prototype's plan as an export says it, and its runs through all stops, seen from the object.
+"""The prototype's plan as a build says it, and its runs through all stops, seen from the object.
 
 The second half is photographed with the object turned by 180 degrees about z. In the frame of the
 object the prototype is turned instead: its camera is then where the shell's camera b is, and each

@@ -106,7 +106,7 @@ class RectangularLamps:
 
 
 def read_lamps(folder: Path) -> RectangularLamps | None:
-    """The lamps of an export's prototype; None where it has none.
+    """The lamps of a build's prototype; None where it has none.
 
     InputError: the record cannot be read.
     """

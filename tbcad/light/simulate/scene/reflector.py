@@ -1,4 +1,4 @@
-"""One camera with its mirrors: of a design, or as an export records it, checked."""
+"""One camera with its mirrors: of a design, or as a build records it, checked."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,7 +125,7 @@ def reflectors(design: MirrorDesign) -> tuple[Reflector, Reflector]:
 
 
 class ExportedDesign(Record):
-    """What the simulation needs of an export."""
+    """What the simulation needs of a build."""
 
     model_config = ConfigDict(frozen=True, arbitrary_types_allowed=True)
 

@@ -30,7 +30,7 @@ SAMPLES = 600  # surfaces that light is fitted on: six and more for each of its 
 
 
 def read_shell_lamps(folder: Path) -> Lamps:
-    """The lamps of an export's shell. InputError: it has none, or its record cannot be read."""
+    """The lamps of a build's shell. InputError: it has none, or its record cannot be read."""
     found = DesignRecord.read(folder / NAME).lamps
     if found is None:
         raise InputError(

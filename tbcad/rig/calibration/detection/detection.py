@@ -32,7 +32,7 @@ LONGER = (
     "see that the LEDs shine, or photograph them with a longer exposure (tbcad run "
     "--preflight-only says which is right)"
 )
-ELSEWHERE = "is this the run of another export, or is the camera far out of place?"
+ELSEWHERE = "is this the run of another build, or is the camera far out of place?"
 # Light over what the same sphere shows of the same LED elsewhere, in the middle: an edge that hides
 # a tenth of a dome shifts its centroid by 0.16 px where its image has a radius of 2 px.
 LEAST, MOST = 0.94, 1.08
