@@ -18,8 +18,8 @@ from tbcad.output.overview import overview
 DOCS = Path(__file__).parent
 RESULTS, PAGE = DOCS / "every-n.json", DOCS / "every-n.md"
 SUBDIVISIONS = range(2, 41)
-COLUMNS = ("n", "mirrors", "lens", "minimum coverage", "balls + caps", "prototype's coverage")
-COLUMNS += ("pixels kept", "turning", "verdict")
+COLUMNS = ("n", "mirrors", "lens, degrees", "balls+caps", "pixels kept")
+EVERY_TO = 13  # beyond, every other n, and those that were built
 BEGIN, END = "<!-- table -->\n", "<!-- end -->\n"
 
 
@@ -53,21 +53,22 @@ def figures_as_built(n: int) -> dict[str, Any]:
 
 
 def page_row(n: str, row: dict[str, Any]) -> str:
-    """A row of the table."""
-    cells = [n, row["mirrors"], f"{row['view_angle_deg']:.0f}°"]
-    cells.append(f"{row['minimum_coverage_mm']:.2f} mm")
+    """A row of the table; of a design that was built and passed n is bold."""
+    cells = [f"**{n}**" if row.get("verdict", "").startswith("PASS") else n, row["mirrors"]]
+    cells.append(f"{row['view_angle_deg']:.0f}")
     if "balls" in row:
-        cells += [f"{row['balls']} + {row['caps']}", f"{row['prototype_coverage_mm']:.2f} mm"]
-        cells += [f"{row['kept_share']:.0%}", f"{row['turning_mass_g']} g"]
+        cells.append(f"{row['balls']}+{row['caps']}")
+        cells.append(f"{row['kept_share']:.0%}")
     else:
-        cells += ["none", "", "", ""]
-    return "| " + " | ".join(map(str, [*cells, row.get("verdict", "")])) + " |"
+        cells += ["none", ""]
+    return "| " + " | ".join(map(str, cells)) + " |"
 
 
 def write_page(results: dict[str, dict[str, Any]]) -> None:
     """Renew the table in the page."""
     lines = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
-    lines += [page_row(n, results[n]) for n in sorted(results, key=int)]
+    shown = [n for n in results if int(n) <= EVERY_TO or not int(n) % 2 or "verdict" in results[n]]
+    lines += [page_row(n, results[n]) for n in sorted(shown, key=int)]
     head, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
     tail = rest.split(END)[1]
     text = head + BEGIN + "\n" + "\n".join(lines) + "\n\n" + END + tail

@@ -36,25 +36,20 @@ from tbcad.tolerancing.process.process import BUILT_IN, load_process, process_er
 
 DOCS = Path(__file__).parent
 RESULTS, PAGE, PICTURES = DOCS / "gallery.json", DOCS / "gallery.md", DOCS / "pictures"
-EVERY_N = json.loads((DOCS / "every-n.json").read_text(encoding="utf-8"))
 PHOTOGRAPH_PX = (640, 480)
 VIEW_DEG = (30.0, 30.0)  # azimuth and elevation
 # Simulated by a chain; where fewer than half of the few are good, only these.
 BUILDS, FEW = 1000, 50
 CAN_BE_MADE = 0.95  # yield
-PAPER_SENSORS = {12: "1040 x 776", 18: "2080 x 1552", 26: "4160 x 3104", 36: "8320 x 6208"}
 HEAD = """\
 # Gallery of designs
 
-Every design that comes with tbcad, with the figures of a dry run. Left: what camera a photographs
-of a knot that fills the capture sphere. Right: a view from azimuth 30, elevation 30 degrees,
-blended from the photographs of both cameras at the depth that they show, as `tbcad view` does;
-with few virtual cameras some of that depth is wrong (specks).
+The designs that come with tbcad, to begin from one: `tbcad init my.toml --from afternoon-print`.
+Other numbers of mirrors: [every subdivision n](every-n.md). Pictures: left, what camera a
+photographs of a knot that fills the capture sphere; right, a view from azimuth 30, elevation 30
+degrees. With few virtual cameras some of its depth is wrong (specks).
 
-`python docs/gallery.py` writes this page, with a design's name that design's figures.
-
-Begin from one of them: `tbcad init my.toml --from afternoon-print`. With other numbers of mirrors:
-[every subdivision n](every-n.md).
+`python docs/gallery.py NAME` renews the figures of a design, which are those of a dry run.
 """
 
 MADE_COLUMNS = ["design", "made by", "yield", "worst camera"]
@@ -62,17 +57,13 @@ MADE_COLUMNS += ["pixels of a virtual camera", "SSIM of views"]
 MADE = """\
 ## What can be made
 
-Each design as it is, those first that most chains make ([what chains are](tolerance.md#chains)):
-by which 95 % or more of 1,000 simulated builds show the whole object with every virtual camera.
-Yield and the median of the worst cameras are those of the best chain. A row's figures:
-`python docs/gallery.py turtleback-nickel`, or `tbcad build turtleback-nickel --out exports/` and
-`tbcad tolerance exports/ --process nickel-diamond`.
-
-{}
-By every chain: yield, and the median of the worst cameras in mm; of 50 builds where fewer than half
-of them are good. With margins for a chain: `tbcad build NAME --process CHAIN`.
+*Made by*: the [chains](tolerance.md#chains) with a yield of 95 % or more in 1,000 simulated builds.
+Yield and median of the worst virtual cameras are those of the best chain
+(`tbcad tolerance exports/ --process nickel-diamond`). `tbcad build NAME --process CHAIN` gives
+a design the margins that a chain needs.
 
 {}"""
+SHOWN = ("object", "mirrors", "camera", "prototype")
 
 
 def chains(spec: Spec) -> dict[str, list[float]]:
@@ -112,7 +103,8 @@ def figures(found: Overview) -> dict[str, Any]:
     }
     if prototype is not None:
         rows["prototype"] = (
-            f"{prototype.balls} balls and {prototype.caps} caps, {prototype.stops} stops; "
+            f"{prototype.balls} ball{'s' * (prototype.balls != 1)} and {prototype.caps} "
+            f"cap{'s' * (prototype.caps != 1)}, {prototype.stops} stops; "
             f"{prototype.kept_share:.0%} of the shell's pixels"
         )
     return {name: value for name, value in rows.items() if value} | {"chains": chains(spec)}
@@ -177,55 +169,25 @@ def design_row(name: str, row: dict[str, Any]) -> list[str]:
 
 
 def can_be_made(results: dict[str, Any]) -> str:
-    """Which chain makes which design."""
-    curved = [name for name in order(results) if results[name]["chains"]]
-    of_chains = [
-        [chain]
-        + [
-            f"{100 * share:.3g} %, {covered:.2f}"
-            for share, covered, _ in (results[name]["chains"][chain] for name in curved)
-        ]
-        for chain in results[curved[0]]["chains"]
-    ]
-    return MADE.format(
-        table(MADE_COLUMNS, [design_row(name, results[name]) for name in order(results)]),
-        table(["chain", *curved], of_chains),
-    )
+    """Which chain makes which design, and the best one's figures."""
+    rows = [design_row(name, results[name]) for name in order(results)]
+    return MADE.format(table(MADE_COLUMNS, rows))
 
 
 def section(name: str, row: dict[str, Any]) -> str:
     """A design's part of the page."""
-    table = "\n".join(f"| {key} | {value} |" for key, value in row.items() if key != "chains")
+    lines = "\n".join(f"- {key}: {row[key]}" for key in SHOWN if key in row)
     return (
         f"## {name}\n\n{purpose(name)} [{name}.toml](../designs/{name}.toml)\n\n"
         f"![Photograph of camera a, and a view](pictures/gallery-{name}.png)\n\n"
-        f"| | |\n|---|---|\n{table}\n"
-    )
-
-
-def paper_sensors() -> str:
-    """The paper's four sensors with its n (Table II), from docs/every-n.json."""
-    rows = []
-    for n, sensor in PAPER_SENSORS.items():
-        row = EVERY_N[str(n)]
-        balls = f"{row['balls']} + {row['caps']}" if "balls" in row else "none"
-        rows.append(
-            f"| {sensor} | {n} | {row['mirrors']} | {row['minimum_coverage_mm']:.2f} mm | {balls} |"
-        )
-    return (
-        "## The paper's sensors\n\nTable II of the paper has these numbers of pixels and n. Build "
-        "one with `tbcad build --n 26 --set camera.width_px=4160 --set camera.height_px=3104`. "
-        "What the table says besides, and what we find: "
-        "[reproduction](reproduction.md#virtual-cameras-and-pixels-fig-5b-table-ii).\n\n"
-        "| sensor | n | mirrors of both halves | minimum coverage | balls + caps of a prototype |\n"
-        "|---|---|---|---|---|\n" + "\n".join(rows) + "\n"
+        f"{lines}\n"
     )
 
 
 def page(results: dict[str, Any]) -> str:
     """The page of the results."""
     parts = [section(name, results[name]) for name in order(results)]
-    return "\n".join([HEAD, can_be_made(results), *parts, paper_sensors()])
+    return "\n".join([HEAD, can_be_made(results), *parts])
 
 
 def main(names: list[str]) -> None:

@@ -28,7 +28,7 @@ class Design(MirrorDesign):
         )
 
     def _repr_html_(self) -> str:
-        """What notebooks show: main figures, and the directions of all mirrors from above."""
+        """HTML for notebooks: main figures, and the directions of all mirrors from above."""
         from tbcad.core.mirrors.record import hemisphere_map
 
         radius = [array.mirrors.radius for array in self.arrays]

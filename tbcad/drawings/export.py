@@ -1,4 +1,4 @@
-"""What drawings take from a build: files as they were written, or refused."""
+"""Files of a build that drawings need: as they were written, or refused."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from tbcad.records.prototype import PrintedPartRecord
 
 SOLIDS = ("shell_a", "shell_b", "mandrel_a", "mandrel_b")
 PROTOTYPE_FILES = (PROTOTYPE, "bom.csv", "balls.csv", "wiring.csv")
-AGAIN = "build it again"
+AGAIN = "run tbcad build again"
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,7 @@ def mm(value: float) -> str:
 
 
 def _remarks(hole: DrawnHole) -> list[str]:
-    """What a slot is, what goes in, and the axis of a tilted hole."""
+    """Remarks on a hole: slot, mating part, axis if tilted."""
     found = [hole.takes] if hole.takes else []
     if np.any(hole.slot):
         length = float(np.linalg.norm(hole.slot)) + 2 * hole.cylinder.radius
@@ -204,7 +204,7 @@ def drawn(corner: Point, tables: Sequence[SheetTable]) -> Iterator[Entity]:
 
 @dataclass(frozen=True)
 class Mate:
-    """What goes into a hole."""
+    """The mating part of a hole."""
 
     name: str  # of the part
     place: Floats  # on its axis, mm, (3,)

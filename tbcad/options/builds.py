@@ -38,7 +38,7 @@ OBJECTIVES: tuple[Objective, ...] = get_args(Objective)
 
 @dataclass(frozen=True)
 class OptimizeOptions(Call):
-    """The design to begin from, what is to be better, and what a better one must keep."""
+    """The design to begin from, its objectives and its limits."""
 
     design: Annotated[AnyDesign | None, typer.Argument(metavar="DESIGN")] = None
     """TOML file or name of the design to begin from; by default that of the paper."""
@@ -46,10 +46,10 @@ class OptimizeOptions(Call):
     settings: Annotated[Sequence[str], typer.Option("--set", metavar="KEY=VALUE")] = ()
     """Change any key of the design; repeatable."""
     objectives: Annotated[Sequence[str], typer.Option("--for", metavar="AIM")] = ()
-    """What to make better; repeatable, and then all count alike. minimum: pixels of the virtual
-    camera with fewest; pixels: mean of the logarithms of the pixels; evenness: their coefficient of
-    variation; ssim: of 24 views of a knot, by --method, which takes several times as long; size: of
-    the machine. By default the first three."""
+    """Objective; repeatable, with equal weights. minimum: pixels of the virtual camera with fewest;
+    pixels: mean of the logarithms of the pixels; evenness: their coefficient of variation; ssim: of
+    24 views of a knot, by --method, which takes several times as long; size: of the machine. By
+    default the first three."""
     out: Annotated[AnyPath, typer.Option("--out", "-o")] = Path("better.toml")
     """TOML file to write; table and plot beside it."""
     max_size_mm: float | None = None
@@ -90,7 +90,7 @@ class OptimizeOptions(Call):
         return out, table, out.with_suffix(f".{self.plot}")
 
     def check(self) -> None:
-        """Refuse what does not go together."""
+        """Refuse options that exclude each other."""
         for name in self.objectives:
             if name not in OBJECTIVES:
                 known = ", ".join(OBJECTIVES)

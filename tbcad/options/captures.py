@@ -51,7 +51,7 @@ class DatasetOptions(Call):
     force: Force = False
 
     def check(self) -> Target:
-        """Refuse what does not go together; the program.
+        """Refuse options that exclude each other; the program.
 
         InputError: there is none, an option is not for it, or a number is out of range.
         """
@@ -155,7 +155,7 @@ class CaptureOptions(Call):
     force: Force = False
 
     def check(self) -> None:
-        """Refuse what does not go together."""
+        """Refuse options that exclude each other."""
         lights, single = str(self.lights), self.samples == 1
         if self.own_light and self.geometry == "prototype":
             raise InputError("--own-light is that of shells: leave out --prototype")

@@ -89,8 +89,7 @@ class MergeOptions(Call):
     """Folder for all files; replaced atomically. By default captures/ with the name
     of the run, such as captures/first."""
     vignetting: Literal["off", "cos4"] = "cos4"
-    """cos4: make good the natural loss of light toward the picture's edge; off: the photographs are
-    even already."""
+    """cos4: correct the natural vignetting of the lens; off: the photographs are even already."""
     flat: Annotated[Sequence[AnyPath], typer.Option(metavar="FILE")] = ()
     """Photograph of an even surface, in place of --vignetting; repeatable, the mean counts."""
     encoding: Literal["linear", "srgb"] = "linear"

@@ -83,7 +83,7 @@ class PrototypeModel(Site):
 
     @property
     def rig_light(self) -> RigLight:
-        """What there is for its camera."""
+        """The light on the object and the name of the camera."""
         lamps, mount = self.frame.find(LampLayout), self.frame.find(CameraMount)
         named = mount.chosen.name if mount and mount.chosen else None
         return RigLight(lamps.lux if lamps else None, named)
@@ -145,7 +145,7 @@ def balance_and_drive(
 
 
 Outcome = tuple[Spec, PrototypeModel | SpecError]
-"""What was tried, and its arrangement or why it has none."""
+"""The spec that was tried, and its arrangement or why it has none."""
 
 
 def _attempts(design: MirrorDesign) -> Iterator[Outcome]:
@@ -277,7 +277,7 @@ def shroud_round(site: Site, frame: FrameLayout) -> ShroudLayout | None:
 
 
 def _remedy(design: MirrorDesign, tried: list[int]) -> str:
-    """What else was tried, as the end of an error message.
+    """Other values that were tried, as the end of an error message.
 
     Where the spec fixes keys that could be open: an arrangement without that, if there is one.
     """
@@ -337,6 +337,6 @@ def _clearances(site: Site, frame: FrameLayout) -> tuple[dict[str, float], dict[
 
 
 def _more_room(name: str) -> str:
-    """What to change so that a body has more clearance."""
+    """Remedy that gives a body more clearance."""
     remedies = (one for part in PARTS for one in part.remedies.items())
     return next((text for pattern, text in remedies if fnmatchcase(name, pattern)), REMEDY)

@@ -1,4 +1,4 @@
-"""What the camera of a design sets in its prototype, tried with all bodies of the arrangement."""
+"""Keys that follow from a design's camera, tried with all bodies of the arrangement."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -26,7 +26,7 @@ class CameraFit:
 
 
 def fit_camera(design: MirrorDesign) -> CameraFit:
-    """What the design's camera sets; nothing where a design without a named one has no prototype.
+    """Keys set by the design's camera; none where a design without a named one has no prototype.
 
     SpecError: the named camera does not fit; it names one that does.
     """

@@ -182,7 +182,7 @@ def _rated(watts: float, parts: Parts) -> PurchasedPart:
 
 @dataclass(frozen=True)
 class LedCircuit:
-    """What the LEDs, which are alike, are connected by."""
+    """The circuit of the LEDs, which are alike."""
 
     resistor: SeriesResistor  # of each
     connector: PurchasedPart  # of their cable
@@ -190,7 +190,7 @@ class LedCircuit:
 
 
 def led_circuit(spec: PrototypeSpec, stage: StageLayout, parts: Parts) -> LedCircuit | None:
-    """What connects the LEDs of a stage; None without any.
+    """The circuit of the LEDs of a stage; None without any.
 
     SpecError when they are too many, or not to be had with this current, supply or bore.
     """

@@ -82,7 +82,7 @@ def fastener_component(fastener: Fastener) -> Component:
 
 
 def fastener_axes(along: Floats) -> Floats:
-    """What x, y and z of a fastener along x become when it is along another direction, as rows.
+    """Axes of a fastener along a direction, as rows; its own x is along it.
 
     What is along no upright direction keeps its z upright, as the slots of T-nuts are.
     """

@@ -26,7 +26,7 @@ from tbcad.types import Floats
 
 @dataclass(frozen=True, kw_only=True)
 class Site:
-    """What parts of the frame are laid out for."""
+    """The surroundings that parts of the frame are laid out for."""
 
     spec: Spec  # of the design
     layout: PrototypeLayout  # balls, their places, the plan of the stops
@@ -63,7 +63,7 @@ class Bracket:
 
 @dataclass(frozen=True, kw_only=True)
 class Mounted:
-    """What a part adds to the frame, in the frame of the shell."""
+    """Additions of a part to the frame, in the frame of the shell."""
 
     brackets: tuple[Bracket, ...] = ()  # on the base plate
     printed: tuple[Component, ...] = ()  # other bodies to print
@@ -116,7 +116,7 @@ class FrameLayout:
 
     @property
     def tools(self) -> tuple[Component, ...]:
-        """What is printed to assemble the others."""
+        """Tools that are printed to assemble the other parts."""
         return tuple(body for one in self.mounted for body in one.tools)
 
     @property

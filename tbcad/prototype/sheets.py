@@ -1,4 +1,4 @@
-"""What the sheets of parts share: title block, scale, outer dimensions."""
+"""Shared by sheets of parts: title block, scale, outer dimensions."""
 
 from collections.abc import Iterator
 

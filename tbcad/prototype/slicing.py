@@ -34,7 +34,7 @@ HOUR_S = 3600.0
 
 @dataclass(frozen=True)
 class PrintSettings:
-    """What a slicer was told: values of its settings by name, mm and seconds."""
+    """Settings of a slicer by name, mm and seconds."""
 
     values: dict[str, float]
 
@@ -204,7 +204,7 @@ def _corners(edges: list[Floats], speed: float, use: PrintSettings) -> float:
 def _inside(
     group: _Group, core: float, use: PrintSettings, infill: float, each: float
 ) -> tuple[float, float]:
-    """What fills a layer within its walls, mm^2, and its seconds: solid layers and infill."""
+    """Fill of a layer within its walls, mm^2, and its seconds: solid layers and infill."""
     if core <= 0:
         return 0.0, 0.0
     share, thin = use["top_solid_layers"] / each, THIN * use["extrusion_width"]

@@ -23,7 +23,7 @@ MESHES = (".stl", ".glb")
 
 
 def picture(folder: Path, file: Path, subject: str = SHELL, force: bool = False) -> None:
-    """Draw one of SUBJECTS of a build to a PNG file, which is replaced as a whole.
+    """Draw one of SUBJECTS of a build to a PNG file, which is replaced atomically.
 
     InputError: the build or a screen is missing, a file of the build is not as it was written,
     the picture exists, or drawing fails.

@@ -18,7 +18,7 @@ from tbcad_verify.types import Progress
 
 ABOUT = """Verify the files in DIR, which `tbcad build` wrote: every virtual camera sees the whole
 object, and the parts are those of the record. The result is written to DIR/verify.json.
-Exit status: 0 verified, 1 not verified, 2 DIR is not an export."""
+Exit status: 0 verified, 1 not verified, 2 DIR is not a build."""
 INTERRUPTED = 130  # exit status of a program that is stopped from the keyboard
 OUTPUTS = {
     "full": "print every check, too",

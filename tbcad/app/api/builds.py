@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Build(InFolder):
-    """What a build wrote.
+    """Files and results of a build.
 
     Attributes:
         folder: that holds all files.

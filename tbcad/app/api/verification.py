@@ -114,9 +114,9 @@ def checked_process(options: ToleranceOptions) -> Process:
 def order(options: OrderOptions) -> dict[str, Any]:
     """Write what a workshop needs to make the shells of a build by a process chain; order.json.
 
-    By how much each mirror may be off and what the chain holds of it: tables, STEP with tolerances,
-    and a page that says the rest. InputError: the build has no shells, or no mandrels that the
-    chain needs, their mirrors are planar or may not be off at all, the chain cannot be read, the
+    Limits of each mirror's errors and what the chain holds of them: tables, STEP with tolerances,
+    and a page for the rest. InputError: the build has no shells, or no mandrels that the
+    chain needs, their mirrors are planar or have no margin, the chain cannot be read, the
     share is not between 0 and 1, or out cannot be replaced.
     """
     exports, out = Path(options.exports), Path(options.out)

@@ -55,7 +55,7 @@ class Views:
 
     @cached_property
     def _field(self) -> Field | None:
-        """What is shown by default, if there is one."""
+        """The field that is shown by default, if there is one."""
         from tbcad.light.reconstruction.field import Field, wanted_field
 
         if isinstance(self._source, Field):

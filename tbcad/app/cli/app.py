@@ -95,7 +95,7 @@ def on_screen(number: int, function: str, options: Call) -> Any:
 
 
 def output_mode(full: bool, quiet: bool, json: bool) -> "Output":
-    """What is to be printed; more than one thing is refused."""
+    """The output that is asked for; more than one is refused."""
     asked: dict[Output, bool] = {"full": full, "quiet": quiet, "json": json}
     chosen = [name for name, wanted in asked.items() if wanted]
     if len(chosen) > 1:
@@ -198,7 +198,7 @@ def _run_study(out: Path, json: bool, plot: "PlotFormat", work: Work) -> int:
 
 
 def _record(result: "Study", files: list[Path]) -> dict[str, object]:
-    """What is shown, for other programs."""
+    """The result for other programs."""
     return {
         "schema": "tbcad-study/1",
         "study": result.name,

@@ -35,7 +35,7 @@ class Stopped(Exception):
 
 
 def shortage(error: Exception) -> str | None:
-    """What the system has no more of, in a line for the screen; None: the error is another."""
+    """The resource that the system lacks, as a line for the screen; None: another error."""
     if isinstance(error, MemoryError | ProcessLost) or str(error) == NO_THREAD:
         reason = str(error) or "no memory"
     elif isinstance(error, OSError) and error.errno in USED_UP:

@@ -1,4 +1,4 @@
-"""What commands do with memory: they look for garbage seldom, and keep what they have freed."""
+"""Memory of commands: garbage is collected seldom, and freed memory is kept."""
 
 import gc
 import sys

@@ -1,1 +1,1 @@
-"""What the words of tbcad mean: terms, keys of a design, and where each is used."""
+"""Meanings of tbcad's words: terms, keys of a design, and where each is used."""

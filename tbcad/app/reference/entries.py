@@ -69,17 +69,15 @@ def glossary() -> Glossary:
 
 def glossary_page() -> str:
     """The page docs/glossary.md."""
-    sections = [f"## {one.title}\n\n{_table(one)}" for one in glossary().sections]
+    sections = [
+        f"## {one.title}\n\n" + "\n".join(map(_defined, one.terms)) for one in glossary().sections
+    ]
     return "\n\n".join(["# Glossary", PAGE_HEAD, glossary().introduction, *sections]) + "\n"
 
 
-def _table(section: TermSection) -> str:
-    columns = {"term": lambda term: term.name, "symbol, unit": _symbol, "meaning": _meaning}
-    if not any(map(_symbol, section.terms)):
-        del columns["symbol, unit"]
-    rows = [list(columns), *([cell(term) for cell in columns.values()] for term in section.terms)]
-    head, *lines = (f"| {' | '.join(row)} |".replace("|  |", "| |") for row in rows)
-    return "\n".join([head, "|---" * len(columns) + "|", *lines])
+def _defined(term: Term) -> str:
+    symbol, source = _symbol(term), f" Source: {term.source}." if term.source else ""
+    return f"- **{term.name}**{symbol and f' ({symbol})'}: {term.meaning}{source}"
 
 
 def _symbol(term: Term) -> str:
@@ -87,14 +85,6 @@ def _symbol(term: Term) -> str:
     symbol = "" if term.equation.startswith(f"{term.symbol} =") else term.symbol
     symbol = "" if symbol == term.name else symbol
     return ", ".join(filter(None, [symbol, term.equation, term.unit]))
-
-
-def _meaning(term: Term) -> str:
-    keys = ", ".join(f"`{key}`" for key in term.keys)
-    said = [term.meaning]
-    said += [f"Source: {term.source}."] if term.source else []
-    said += [f"Keys: {keys}."] if len(term.keys) > 1 else [f"Key: {keys}."] if keys else []
-    return " ".join(said)
 
 
 GREEK = {"θ": "theta", "\N{GREEK SMALL LETTER RHO}": "rho"}

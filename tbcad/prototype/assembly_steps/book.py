@@ -52,7 +52,7 @@ PICTURES = (
 
 @dataclass(frozen=True)
 class Block:
-    """What is not parted between two sheets."""
+    """A block that stays on one sheet."""
 
     height: float  # mm
     draw: Callable[[float], Iterable[Entity]]  # by the height of its upper edge on paper, mm
@@ -130,7 +130,7 @@ def _cover(
 
 
 def _front(told: Instructions) -> Iterator[Block]:
-    """What is read before the first step: about, tools, times."""
+    """Blocks before the first step: about, tools, times."""
     yield from _section("Before the first step", map(_paragraph, (*told.about, PICTURES)))
     yield from _section("Tools", _listed(told.tools))
     rows = [(str(one.number), one.title, hours_text(told.minutes[one.key])) for one in told.steps]

@@ -85,7 +85,7 @@ def _printing(printer: PrinterSpec, sums: dict[str, Any]) -> Iterator[tuple[str,
 
 
 def designation(row: Row) -> str:
-    """What a part of the list is, by standards and sizes: without the number of a supplier."""
+    """A part of the list by standards and sizes: without the number of a supplier."""
     return without_example(str(row["what"]))
 
 
@@ -118,7 +118,7 @@ def hours_text(minutes: float) -> str:
 
 
 def _work(machine: AssembledMachine, use: Use) -> str:
-    """What is done with a part: by its kind, and by its body where it is in no list."""
+    """Work on a part: by its kind, or by its body where it is in no list."""
     if (kind := machine.kind(use.part)) != OWN:
         return kind
     if not use.bodies or not machine.is_printed(use.bodies[0]):

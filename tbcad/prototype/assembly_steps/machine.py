@@ -21,7 +21,7 @@ RESISTORS, OWN = "resistors", "own"
 
 @dataclass(frozen=True)
 class AssembledMachine:
-    """What a prototype consists of."""
+    """The parts of a prototype."""
 
     bill: PartsList  # its list of parts
     record: Prototype  # prototype.json
@@ -89,7 +89,7 @@ def read_machine(folder: Path) -> AssembledMachine:
 
 
 Words: TypeAlias = tuple[list[str], ...]
-"""What is done in a step, what must be true afterwards, and fits besides; empty texts are none."""
+"""Actions of a step, checks afterwards, and fits; empty texts are left out."""
 
 
 @dataclass(frozen=True)

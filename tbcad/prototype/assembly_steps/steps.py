@@ -111,7 +111,7 @@ def mounting_steps(machine: AssembledMachine) -> tuple[list[StepPlan], dict[str,
 
 
 def mounting_record(machine: AssembledMachine) -> tuple[AssemblyStep, ...]:
-    """What each step mounts, for prototype.json."""
+    """Bodies that each step mounts, for prototype.json."""
     plans, mounting = mounting_steps(machine)
     mounts: dict[str, list[str]] = {plan.key: [] for plan in plans}
     for body, key in mounting.items():
@@ -171,7 +171,7 @@ def _loose(
 
 
 def _uses(machine: AssembledMachine, parts: dict[str, str], loose: Counter[str]) -> tuple[Use, ...]:
-    """What a step takes, by its bodies' parts, and loose."""
+    """Parts that a step uses: those of its bodies, and loose ones."""
     here: dict[str, list[str]] = {part: [] for part in loose}
     for body, part in parts.items():
         here.setdefault(part, []).append(body)
@@ -240,7 +240,7 @@ def _kinds_on_axis(machine: AssembledMachine, screw: FastenerRecord, thread: flo
 
 
 def _head_force(machine: AssembledMachine, screw: FastenerRecord, part: PurchasedPart) -> float:
-    """What the plastic below the head bears, N; without limit below a head on metal."""
+    """Largest force on the plastic below the head, N; without limit below a head on metal."""
     if part.kind == "setscrews" or not machine.is_printed(screw.through[0]):
         return math.inf
     # Its washers are at its head, in the same direction.
@@ -256,7 +256,7 @@ def _head_force(machine: AssembledMachine, screw: FastenerRecord, part: Purchase
 
 
 def _thread_force(machine: AssembledMachine, thread: float, held_by: str) -> float:
-    """What the screw's core bears, and the plastic round any insert of its thread, N."""
+    """Largest force on the screw's core and on the plastic round an insert of its thread, N."""
     forces = [PROOF_SHARE * PROOF_MPA * math.pi * core_radius(thread) ** 2]
     for one in machine.fasteners if held_by == "insert" else ():
         part = machine.listed(one.part)

@@ -141,7 +141,7 @@ def _inside(point: Point, room: Box) -> bool:
 
 
 def _clipped(start: Point, end: Point, room: Box) -> tuple[Point, Point] | None:
-    """What of a line is in a room (Liang and Barsky); None without any."""
+    """The part of a line inside a box (Liang and Barsky); None without any."""
     if _inside(start, room) and _inside(end, room):
         return (start, end) if start != end else None
     way, first, last = (end[0] - start[0], end[1] - start[1]), 0.0, 1.0

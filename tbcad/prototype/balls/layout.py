@@ -70,7 +70,7 @@ class BallFit:
 
 
 def ball_fit(candidates: BallCandidates, balls: Balls) -> BallFit:
-    """What the balls show in place of the mirrors."""
+    """Views of the balls in place of the mirrors."""
     array, groups = candidates.array, candidates.groups
     shell = used_outlines(
         ball_poses(array.ellipsoid, array.polar),
@@ -96,7 +96,7 @@ def _pixels(array: MirrorArray, outline: Floats) -> Floats:
 def ball_alternatives(
     spec: Spec, array: MirrorArray, groups: MirrorGroups, balls: Balls, fit: BallFit
 ) -> tuple[Alternative, ...]:
-    """What each rule costs for groups of camera a's mirrors; fit is by the spec's own rule.
+    """Cost of each rule for groups of camera a's mirrors; fit is by the spec's own rule.
 
     pixels are those kept of all mirrors together, coverage_mm is the minimum coverage diameter
     within the moved cells, and mirrors_below_target counts those whose coverage is less.
@@ -195,7 +195,7 @@ class PrototypeLayout:
 
     @cached_property
     def alternatives(self) -> tuple[Alternative, ...]:
-        """What each rule to choose the balls costs, as of `ball_alternatives`."""
+        """Cost of each rule to choose the balls, as of `ball_alternatives`."""
         return ball_alternatives(self.spec, self.array, self.groups, self.balls, self.fit)
 
 

@@ -197,7 +197,7 @@ def _limits(spec: Spec, base: BaseLayout, prototype: PrototypeLayout, k: int) ->
 
 
 def holding(base: BaseLayout, prototype: PrototypeLayout, parts: Parts) -> Holding:
-    """What holds each ball in its seat, with the pads as they are turned, and assumptions."""
+    """Holding force of each ball in its seat, with the pads as they are turned, and assumptions."""
     seats, motion = base.seats, base_motion(prototype.spec)
     masses = ball_masses(prototype)
     needed = force_needed(

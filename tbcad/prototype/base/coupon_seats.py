@@ -141,7 +141,7 @@ def with_pads(
 
 
 def _between_legs(seats: Seats, spec: BaseSpec, k: int) -> Iterator[TopoDS_Shape]:
-    """What is cut out between two legs each, outside the core."""
+    """Cuts between two legs each, outside the core."""
     core, boss = core_radius(seats, spec, k), float(seats.boss[k])
     if core >= boss:
         return
@@ -204,7 +204,7 @@ def wall_section(seats: Seats, spec: BaseSpec, k: int) -> Floats:
 
 
 def _cone(seats: Seats, spec: BaseSpec, k: int) -> float:
-    """What z + r is on the cone of 45 degrees that is tangent to the sphere round the cup, mm."""
+    """Sum z + r on the cone of 45 degrees that is tangent to the sphere round the cup, mm."""
     return float(np.sqrt(2) * (seats.cup[k] + spec.cup_wall_mm))
 
 

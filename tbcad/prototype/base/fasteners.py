@@ -197,7 +197,7 @@ def coupon_step(machine: AssembledMachine) -> Words:
 
 @planned("The carrier", "carrier", "carrier_*", loose=("GLUE-EPOXY",))
 def carrier_step(machine: AssembledMachine) -> Words:
-    """What is glued and pressed into the carrier, and its joints."""
+    """Words for parts glued and pressed into the carrier, and for its joints."""
     cut, shaft = machine.has("carrier_1"), machine.has("shaft")
     magnets = [one for one in machine.record.holding.balls if one.by == "magnet"]
     part = machine.listed(machine.bodies["shaft"]) if shaft else None

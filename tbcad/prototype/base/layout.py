@@ -90,7 +90,7 @@ class BaseLayout:
 
     @property
     def axes(self) -> Floats:
-        """What x, y and z of the carrier's own frame are in the frame of the shell, as rows.
+        """Axes x, y and z of the carrier's own frame, in the frame of the shell, as rows.
 
         Its z is the axis toward the camera, its x azimuth zero.
         """

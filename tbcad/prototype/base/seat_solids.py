@@ -54,7 +54,7 @@ def boss_solid(seats: Seats, k: int) -> TopoDS_Shape:
 
 
 def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Solid:
-    """What a ball and its magnet need, without posts of pads, in the own frame of seat k.
+    """Hollow for a ball and its magnet, without posts of pads, in the own frame of seat k.
 
     Pads are moved off the ball by an offset, mm.
     """
@@ -62,7 +62,7 @@ def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Solid:
 
 
 def seat_room(seats: Seats, k: int) -> TopoDS_Shape:
-    """What a ball and its magnet need where no pads are, in the seat's own frame."""
+    """Room of a ball and its magnet where no pads are, in the seat's own frame."""
     # Seams where no pad is: half way between two of them.
     seam = np.array([*meridian(float(seats.pad_azimuth[k]) + np.pi / 3), ALONG])
     sizes = float(seats.cup[k]), float(seats.pocket[k]), float(seats.bottom[k])
@@ -128,7 +128,7 @@ def _with_holes(maker: Maker, face: TopoDS_Face, rims: Sequence[Ring]) -> TopoDS
 
 
 def insertion_path(seats: Seats, k: int) -> TopoDS_Shape:
-    """What a ball needs to be inserted, in its own frame."""
+    """Room to insert a ball, in its own frame."""
     out = seats.insertion[k] @ seats.axes[k].T
     length = float(np.linalg.norm(out))
     radius = seats.radius[k] + (1 - NARROWER) * (seats.cup[k] - seats.radius[k])

@@ -243,7 +243,7 @@ def added_solids(base: BaseLayout, seats: Seats, split: BaseSplit = UNCUT) -> li
 
 
 def removed_solids(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
-    """What is cut out of that union: first the hollows of all seats, then paths and holes."""
+    """Solids cut out of that union: first the hollows of all seats, then paths and holes."""
     hollows = _at_seats(seats, lambda seats, k: seat_hollow(seats, k, seats.pad_offset))
     return [*hollows, *_paths_and_holes(base, seats)]
 

@@ -65,7 +65,7 @@ def number_solids(base: BaseLayout, split: BaseSplit) -> list[TopoDS_Shape]:
 
 
 def label_windows(base: BaseLayout, split: BaseSplit) -> list[TopoDS_Shape]:
-    """What ribs and rings leave free over these numbers."""
+    """Windows that ribs and rings leave over these numbers."""
     return [
         cylinder(place + (base.spec.joint_mm - RECESS_MM) * out, out, LABEL_MM, ACCESS_MM)
         for joint in split.joints
@@ -128,7 +128,7 @@ def _seats_in(base: BaseLayout, split: BaseSplit, n: int) -> Bools:
 
 
 def piece_holes(base: BaseLayout, split: BaseSplit, n: int) -> list[TopoDS_Shape]:
-    """What is cut out of a piece at its joints, from beyond the plane."""
+    """Holes of a piece at its joints, cut from beyond the plane."""
     return [
         hole
         for joint in split.joints

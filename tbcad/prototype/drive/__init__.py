@@ -1,1 +1,1 @@
-"""What turns the base, and the load that it bears."""
+"""The drive of the base and its loads."""

@@ -253,7 +253,7 @@ class DriveLoads:
         return self.torques.gravity * self.belt_compliance
 
     def faults(self) -> Iterator[str]:
-        """What the drive does not bear, in words."""
+        """Loads beyond the drive's limits, in words."""
         yields = math.degrees(self.motor_wind_up + self.belt_wind_up)
         if self.drive.holds_nmm < self.torques.required:
             yield f"holds {self.drive.holds_nmm:.0f} N mm of {self.torques.required:.0f}"
@@ -271,7 +271,7 @@ class DriveLoads:
 
 
 def drive_loads(drive: Drive, torques: BaseTorques) -> DriveLoads:
-    """What a drive bears under the torques of the base."""
+    """Loads of a drive under the torques of the base."""
     pull = drive.belt_pull(torques.peak)
     tension, self_locking = (0.5 + SLACK_SHARE) * pull, drive.efficiency < SELF_LOCKING
     held = 0.0 if self_locking else min(HOLD_MARGIN * torques.gravity / drive.holds_nmm, 1.0)

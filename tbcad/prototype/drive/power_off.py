@@ -75,7 +75,7 @@ def _until_braked(brake: PurchasedPart, torque: float, balance: BaseBalance) -> 
 
 
 def power_off(drive: Drive, balance: BaseBalance, travel: tuple[float, float]) -> PowerOff:
-    """What a base does without power between the ends of its travel, radians."""
+    """Motion of a base without power between the ends of its travel, radians."""
     energy, inertia = fall_energy(drive, balance, travel), balance.inertia * KG_M2
     force, brake = balance.torque_amplitude / PIN_OUT_MM, drive.brake
     return PowerOff(

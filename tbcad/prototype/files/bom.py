@@ -150,7 +150,7 @@ def is_tool(row: Row) -> bool:
 
 
 def _row(part: str, what: str, quantity: int, material: str, mass: float) -> Row:
-    """What all rows have; mass is that of one, grams."""
+    """Columns of all rows; mass is that of one piece, grams."""
     rounded = round(mass, GRAM_DECIMALS) if mass >= LIGHT_G else _estimate(mass)
     return {
         "quantity": quantity,

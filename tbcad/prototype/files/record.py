@@ -53,7 +53,7 @@ NOT_BLACKENED = ("bearing_*", "camera", "lamp_[0-9]")
 
 
 def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Sheet]) -> Prototype:
-    """What is known of the prototype, in numbers, but its steps of assembly."""
+    """Record of the prototype, without its steps of assembly."""
     layout, spec, frame = built.layout, built.spec.prototype, built.frame
     homing, stock, leds = frame.of(HomingLayout), frame.of(Stock), len(built.stage.leds)
     angles = homing.angles
@@ -124,7 +124,7 @@ def _body_finish(name: str) -> str | None:
 def drive_record(
     balance: BaseBalance, drive: Drive, motion: MotionSpec, swing: tuple[float, float]
 ) -> DriveRecord:
-    """What the drive must bear and does over a swing (radians), with its limits."""
+    """Loads of the drive over a swing (radians), with their limits."""
     torques = base_torques(balance, swing, motion)
     loads = drive_loads(drive, torques)
     return DriveRecord(
@@ -203,7 +203,7 @@ def part_record(part: PrintedPart, quantity: int = 1) -> records.PrintedPartReco
 
 
 def _calibration(built: PrototypeModel) -> records.CentreEstimate | None:
-    """What the LEDs will tell of the balls' centres; None without LEDs."""
+    """Expected accuracy of the balls' centres by the LEDs; None without LEDs."""
     if not len(built.stage.leds):
         return None
     capture, stage = built.spec.optics.capture_diameter_mm / 2, built.spec.prototype.stage

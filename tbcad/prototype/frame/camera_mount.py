@@ -1,4 +1,4 @@
-"""What holds the camera: a bracket on the base plate, a plate on three screws, a fence.
+"""The camera's mount: a bracket on the base plate, a plate on three screws, a fence.
 
 Six ways to move, each with screws of its own. The bracket's foot slides along the plate; three
 screws between bracket and camera plate set the distance, roll and pitch; their slots in the bracket
@@ -367,7 +367,7 @@ def _has_step(place: _Place) -> bool:
 
 
 def _step(place: _Place) -> tuple[Primitive, Primitive]:
-    """What keeps the lens off the plate, and the hole of the tripod screw in it."""
+    """The step that keeps the lens clear of the plate, and the hole of the tripod screw in it."""
     assert place.chosen is not None
     start, half = place.chosen.flange + RISER_END_MM, max(RISER_HALF_MM, place.chosen.half_width)
     end = place.back + OVERLAP_MM

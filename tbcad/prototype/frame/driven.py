@@ -1,4 +1,4 @@
-"""What turns the base: motor, wheels, coupling, shaft and rotary stage in their places."""
+"""The drive in its place: motor, wheels, coupling, shaft and rotary stage."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

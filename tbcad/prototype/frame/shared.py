@@ -1,4 +1,4 @@
-"""What parts of the frame share: axes, sizes, bodies, and fasteners in uprights."""
+"""Shared by parts of the frame: axes, sizes, bodies, and fasteners in uprights."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

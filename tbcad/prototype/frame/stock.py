@@ -1,4 +1,4 @@
-"""What all else is mounted to: base plate, uprights, and the brackets that they stand in."""
+"""Stock that carries all parts: base plate, uprights, and the brackets of the uprights."""
 
 import re
 from collections.abc import Iterator, Sequence

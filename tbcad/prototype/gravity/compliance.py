@@ -16,7 +16,7 @@ CELL_MM = 5.0
 
 @dataclass(frozen=True)
 class Material:
-    """What a part is printed of."""
+    """Material of a printed part."""
 
     modulus: float  # of solid material, GPa
     density: float  # of solid material, g/cm^3
@@ -100,7 +100,7 @@ def _fit(cells: Cells, nodes: Ints, centre: Floats) -> Floats:
 
 
 def rigid_motion(arm: Floats) -> Floats:
-    """What a shift and a small turn move places (n, 3) from the turn's centre by, (n, 3, 6)."""
+    """Displacements of places (n, 3) by a unit shift and a small turn about a centre, (n, 3, 6)."""
     turn = np.cross(np.eye(3)[None], arm[:, None]).transpose(0, 2, 1)
     return np.concatenate([np.broadcast_to(np.eye(3), turn.shape), turn], axis=2)
 

@@ -51,7 +51,7 @@ class Sag:
         )
 
     def unmodelled(self, moved: Floats, freedoms: list[int]) -> Floats:
-        """What is left of displacements (s, k, 3) after calibration, mm, (s, k).
+        """Residual of displacements (s, k, 3) after calibration, mm, (s, k).
 
         Calibration takes out where the balls are on the mean over stops, and for each stop the best
         rigid motion of some freedoms: 0 to 2 are shifts along the axes, 3 to 5 turns about them.
@@ -108,8 +108,8 @@ def read_sag(folder: Path) -> Sag | None:
     shape = len(stops), len(balls)
     if [(row.stop, row.ball) for row in rows] != [(s + 1, k + 1) for s, k in np.ndindex(shape)]:
         raise InputError(
-            f"{folder / SagRow.FILE} has not a row for each of {shape[0]} stops and {shape[1]} "
-            "balls, in order: build it again"
+            f"{folder / SagRow.FILE} lacks a row for each of {shape[0]} stops and {shape[1]} "
+            "balls, in order: run tbcad build again"
         )
     angle = np.radians([row.base_angle_deg for row in stops])
     axes = np.array([record.frame.axis, record.frame.zero, record.frame.third])

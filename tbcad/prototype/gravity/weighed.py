@@ -1,4 +1,4 @@
-"""What weight does to an arrangement, and its seats placed against the mean of that.
+"""Sag of an arrangement, and seats that are offset by its mean.
 
 Carrier and bearing head are linear elastic solids, as they are to be built; the shaft is a beam on
 two bearings, the uprights are columns. All else is rigid: bearings, screwed joints, plate, feet.
@@ -52,7 +52,7 @@ X = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class WeighedBase:
-    """What a base, its weight and what holds it are, in the base's frame at angle zero."""
+    """A base, its weight and its supports, in the base's frame at angle zero."""
 
     axes: Floats  # of that frame in the shell's, as rows, (3, 3)
     angle: Floats  # of the base at each stop, radians, (s,)

@@ -121,7 +121,7 @@ class _LampSearch:
         return z
 
     def fault(self, lamps: Lamps, z: float) -> str:
-        """What is wrong with lamps at a height, or nothing."""
+        """The fault of lamps at a height, or an empty text."""
         keep_out, need = self.site.keep_out, lamps.spec.frame.clearance_mm
         if _lowest(lamps, z) < lamps.spec.frame.floor_mm + FOOT_HEIGHT_MM:
             return "the lamps reach down to the base plate"

@@ -99,7 +99,7 @@ def shroud_layout(
 
 
 def pattern(panel: Panel, sheet: PurchasedPart) -> list[Entity]:
-    """What is cut and folded of a panel, its lower left corner at the origin, seen from inside."""
+    """Cuts and folds of a panel, its lower left corner at the origin, seen from inside."""
     (width, height), folds = panel.size, []
     corners: list[tuple[float, float]] = [(0.0, 0.0)]
     if panel.notched:

@@ -143,7 +143,7 @@ def choose_screw(parts: Parts, thread: float, length: float) -> PurchasedPart:
 
 @dataclass(frozen=True)
 class Price:
-    """What one piece costs."""
+    """Price of one piece."""
 
     amount: float  # in the currency
     currency: str  # by ISO 4217

@@ -1,4 +1,4 @@
-"""What the 3D view shows: shells, bodies of prototype.glb, facts of mirrors; arrays as text."""
+"""Contents of the 3D view: shells, bodies of prototype.glb, facts of mirrors; arrays as text."""
 
 import base64
 import zlib
@@ -70,8 +70,8 @@ MEASURED = (
     ("covered", "Coverage, on the spheres in the files", "mm", 2, "coverage_fitted_mm"),
     ("facets", "Coverage, on the facets in the files", "mm", 2, "coverage_facet_mm"),
     ("pixels", "Pixels", "", 0, "pixels"),
-    ("centre", "Centre in the files, off by", "µm", 3, "centre_error_mm"),
-    ("radius_error", "Radius in the files, off by", "µm", 3, "radius_error_mm"),
+    ("centre", "Position error of the centre, in the files", "µm", 3, "centre_error_mm"),
+    ("radius_error", "Radius error, in the files", "µm", 3, "radius_error_mm"),
 )
 
 
@@ -99,7 +99,7 @@ def packed_mirrors(folder: Path, verdict: Verdict | None, arrays: PackedArrays) 
     plan = {row.mirror: row for row in PictureRow.read(folder)} if there else {}
     shown = [plan.get(row.id) for row in rows]
     off = np.array([one.error_deg if one else np.nan for one in shown])
-    pointing = Quantity("pointing", "Prototype: direction off by", "°", 2, off)
+    pointing = Quantity("pointing", "Prototype: direction error", "°", 2, off)
     quantities = [*_verified(rows, verdict), *_designed(rows), pointing]
     # Ball, stop, angle of the base and turn of the object, degrees.
     photographs = [

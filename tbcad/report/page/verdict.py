@@ -40,7 +40,7 @@ class PrintRow(Record):
 
 
 class MeasuredMirror(Record):
-    """What was measured of a mirror."""
+    """Measurements of a mirror."""
 
     id: str
     coverage_facet_mm: Finite | None = None
@@ -109,7 +109,7 @@ def _files(verdict: Verdict | None, views: int, balls: int, target_mm: float) ->
 
 
 def _key_figures(verdict: Verdict) -> Iterator[str]:
-    """What decides whether a build is good, each with its limit."""
+    """Figures that decide the verdict of a build, each with its limit."""
     named = {check.name: check for check in verdict.checks}
     count = Counter(check.name for check in verdict.checks)
     yield "<table><tbody>"
@@ -188,7 +188,7 @@ def _yields(yields: Sequence[ProcessYield]) -> str:
 
 
 def checks_html(verdict: Verdict | None) -> Iterator[str]:
-    """What did not pass, then all checks by name."""
+    """Failed checks, then all checks by name."""
     if verdict is None:
         yield "<p>This build is not verified.</p>"
         return

@@ -94,7 +94,7 @@ def test_prints_what_is_in_the_record(captured: Path, tmp_path: Path, cli: Comma
         assert [np.median(values), values.max()] == pytest.approx([*figures.values()], abs=1e-5)
     said = cli(*export).out
     assert said.startswith(f"{len(rows)} virtual cameras, 48 x 48 pixels each\n")
-    assert f"{record['reprojection_error_px']['median']:.3f} pixels off" in said
+    assert f"{record['reprojection_error_px']['median']:.3f} pixels (median)" in said
 
 
 def test_reprojection_falls_with_the_error_of_the_pinhole(captured: Path, tmp_path: Path) -> None:

@@ -190,7 +190,7 @@ def test_a_camera_that_looks_aside_fails(machine: Machine, judged: Judged) -> No
     ("change", "message"),
     [
         (lambda m: m.update(schema="x"), "schema is x"),
-        (lambda m: m["spheres"].pop(), "has 3 balls, the export 4"),
+        (lambda m: m["spheres"].pop(), "has 3 balls, the build 4"),
         (lambda m: m["angle_deg"].pop(), "another number of angles"),
         (lambda m: m.update(axis=[0, 0, 2]), "axis of another length"),
         (lambda m: m["camera"].update(focal_px=[0, 1]), "not above 0"),

@@ -136,7 +136,7 @@ class AsBuiltReport:
                 yield shortened(f"- {check.name}: {measured}: {check.detail}")
                 yield f"    -> {remedy(check)}"
         yield (
-            f"The base as a whole: zero off by {self.turn_deg:.3f} degrees, tilted by "
+            f"The whole base: error of zero {self.turn_deg:.3f} degrees, tilted by "
             f"{self.tilt_deg:.3f}, {self.shift_mm:.3f} mm aside"
         )
         yield from HEAD
@@ -159,7 +159,7 @@ def _mm(value: float | None) -> str:
 def verify_as_built(
     folder: Path, calibration: Path, progress: Progress = lambda _: None
 ) -> AsBuiltReport:
-    """Verify the prototype of an export as a calibration found it.
+    """Verify the prototype of a build as a calibration found it.
 
     `progress`: called with the name of each stage.
 

@@ -1,4 +1,4 @@
-"""What each mirror's ball shows where the calibration found camera, base and balls."""
+"""Views by each mirror's ball, where the calibration found camera, base and balls."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Half:
 
 @dataclass(frozen=True)
 class HalfViews:
-    """What m mirrors show."""
+    """Views of m mirrors."""
 
     coverage: Floats  # (m,) mm; NaN where the stop was not measured
     margin: Floats  # (m,) least distance of the window from the picture's edge, pixels
@@ -74,8 +74,8 @@ def halves(context: PrototypeContext, machine: AsBuilt) -> list[Half]:
     """
     if len(machine.balls) != len(context.prototype.balls):
         raise BadExport(
-            f"machine.json has {len(machine.balls)} balls, the export "
-            f"{len(context.prototype.balls)}; name the export that was calibrated"
+            f"machine.json has {len(machine.balls)} balls, the build "
+            f"{len(context.prototype.balls)}; name the build that was calibrated"
         )
     mine = context.prototype.camera
     others = [name for name in context.export.cameras if name != mine]

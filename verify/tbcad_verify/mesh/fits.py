@@ -25,7 +25,7 @@ RIDGE = 1e-10
 
 @dataclass(frozen=True)
 class SurfaceFits:
-    """What each of K segments is, measured on its vertices."""
+    """Shape of each of K segments, measured on its vertices."""
 
     surfaces: Surfaces  # K best spheres or planes
     form: Floats  # (K,) root mean square of the vertices' distances, mm

@@ -175,7 +175,7 @@ def _twins(faces: Ints, count: int) -> Ints:
 
 
 def manifold_status(mesh: Mesh) -> str:
-    """What manifold3d says; "NoError" is good."""
+    """Status by manifold3d; "NoError" passes."""
     import manifold3d
 
     shape = manifold3d.Manifold(

@@ -1,8 +1,8 @@
-"""Programs that users open the exported files with, and what they report about an export.
+"""Programs that users open the exported files with, and what they report about a build.
 
 The verification does not need them. Where they are installed, they are a second opinion from code
 that neither tbcad nor the verification shares. Each runs as a child process with a time limit, on
-a copy of one file in a private folder. None of them sees the export itself.
+a copy of one file in a private folder. None of them sees the build itself.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What one program is asked about one kind of file, the sandbox that it runs in, and its answers.
+"""Questions to one program about one kind of file, its sandbox, and its answers.
 
 What a program does not answer clearly is unknown.
 """
@@ -42,7 +42,7 @@ class ExpectedPart:
     """One part, and what the programs should find in its files."""
 
     name: str  # of the part
-    # "step", "stl", "3mf" -> file name inside the export; missing ones are skipped
+    # "step", "stl", "3mf" -> file name inside the build; missing ones are skipped
     files: Mapping[str, str]
     spheres: int | None  # number of spherical faces of the solid; None: any number
     volume: float  # of the mesh, mm^3; NaN when it is unknown
@@ -56,7 +56,7 @@ class Sandbox:
     command: Command  # how the program's command line starts
     folder: Path  # absolute
     copy: Path  # in the folder. Its name is ours, so that it is never taken for an option.
-    file: str  # name of the original inside the export
+    file: str  # name of the original inside the build
     limits: Limits  # of the run
 
     def run(self, *arguments: str | Path) -> Outcome:
@@ -94,7 +94,7 @@ def sandbox(
 ) -> Iterator[Sandbox]:
     """A sandbox that is deleted afterwards.
 
-    BadExport: the file is no regular file inside the export.
+    BadExport: the file is no regular file inside the build.
     """
     original = locate(folder, file)
     with tempfile.TemporaryDirectory(prefix="tbcad-", ignore_cleanup_errors=True) as name:

@@ -326,7 +326,7 @@ def check_with_programs(
     The checks of a program that is not installed are skipped: see `is_skipped`. Those of one that
     crashes, runs out of time or gives no clear answer are unknown. An interrupt kills all of them.
 
-    `folder`: the export; its files should have been compared with the manifest before.
+    `folder`: the build; its files should have been compared with the manifest before.
     `progress`: called with program and file before each run, from several threads.
 
     BadExport: the folder is missing or is no folder.

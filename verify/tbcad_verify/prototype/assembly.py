@@ -129,7 +129,7 @@ def checks(
 def _inventory_faults(
     context: PrototypeContext, drawn: dict[str, Shape], solids: dict[str, TextSolid]
 ) -> Iterator[str]:
-    """What the assembly has too little or too much, and what turns without need."""
+    """Bodies that the assembly lacks or has in excess, and those that turn without need."""
     prototype = context.prototype
     panels = prototype.shroud.panels if prototype.shroud else ()
     names = {part.name for part in prototype.parts if part.role != TOOL} | VIEWS

@@ -1,4 +1,4 @@
-"""An export as the prototype's checks use it: its record, its camera, and the mirrors it serves."""
+"""A build as the prototype's checks use it: its record, its camera, and the mirrors it serves."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CAP_DENSITIES = {"printed": 1.18, "turned": 2.70, "none": 0.0}
 
 @dataclass(frozen=True)
 class PrototypeContext:
-    """One export with a prototype."""
+    """One build with a prototype."""
 
     export: Export  # the whole record
     prototype: Prototype  # the record of the prototype

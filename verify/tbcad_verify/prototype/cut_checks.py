@@ -1,4 +1,4 @@
-"""What is cut or drilled: DXF files and drill table against bodies of the assembly.
+"""Cut and drilled parts: DXF files and drill table against bodies of the assembly.
 
 All that is on the layer `cut` is a cut of the body.
 """
@@ -56,7 +56,7 @@ def _drawing_faults(context: PrototypeContext, assembly: Mapping[str, TextSolid]
 
 
 def flat_drawing(context: PrototypeContext, file: str) -> FlatDrawing:
-    """A drawing of the export, as it is cut. Unknown: it cannot be read."""
+    """A drawing of the build, as it is cut. Unknown: it cannot be read."""
     return read_dxf(read(context.export.folder, file, MAX_TEXT_BYTES))
 
 

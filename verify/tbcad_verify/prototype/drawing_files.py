@@ -79,7 +79,7 @@ Entity = dict[int, list[str]]
 
 
 class FlatDrawing(NamedTuple):
-    """What a DXF says is to be cut and folded."""
+    """Cuts and folds of a DXF."""
 
     circles: Floats  # (N, 3) x, y and radius, mm
     outlines: list[Floats]  # (M, 2) corners of each, closed unless it has arcs beside it
@@ -208,7 +208,7 @@ def _refuse_entity(one: Entity) -> None:
 
 
 def sheet_faults(blob: FileBytes) -> list[str]:
-    """What a drawing, of one sheet or more, has that tbcad does not write; empty for none."""
+    """Contents of a drawing that tbcad does not write; empty for none."""
     text = blob.data.tobytes().decode("cp1252", errors="replace")
     found = KIDS.search(text)
     pages = min(int(found[2]), MOST_PAGES) if found else 1
@@ -231,7 +231,7 @@ def sheet_faults(blob: FileBytes) -> list[str]:
 
 
 def _page_faults(name: str, size: tuple[str, ...], drawn: list[str]) -> list[str]:
-    """What is wrong with a page of a size (points) and its lines; the frame is the first."""
+    """Faults of a page of a size (points) and its lines; the frame is the first."""
     frame = FRAME.fullmatch(drawn[0])
     ends = [float(frame[k]) + BORDER_MM for k in (1, 2)] if frame else [math.nan, math.nan]
     page = [float(side) / POINTS_PER_MM for side in size]

@@ -76,7 +76,7 @@ class Gear:
 
 @dataclass(frozen=True)
 class Balance:
-    """What turns: mass, g, centre of gravity (3,), mm, and inertia about the axis, g mm^2."""
+    """Turning parts: mass, g, centre of gravity (3,), mm, and inertia about the axis, g mm^2."""
 
     mass: float
     centre: Floats
@@ -142,7 +142,7 @@ def gear_of(context: PrototypeContext, solids: Mapping[str, TextSolid]) -> Gear:
             raise Unknown(f"there is no {name} of known teeth")
         teeth, rim = int(pulley[1]), next(face for face in solids[name].faces if not face.hollow)
         if abs(rim.radius - teeth * PITCH_MM / (2 * np.pi) - RIM_MM) > AXIS_MM:
-            raise Unknown(f"the {name} of the assembly has not {teeth} teeth")
+            raise Unknown(f"the {name} of the assembly does not have {teeth} teeth")
         found.append((teeth, rim, float(pulley[2] or NARROW_MM)))
     (teeth, wheel, width), (few, pinion, other) = found
     if width != other:
@@ -161,7 +161,7 @@ def _worst_torque(context: PrototypeContext, balance: Balance) -> float:
 def _faults(
     context: PrototypeContext, motor: float, gear: Gear, worst: float, peak: float
 ) -> Iterator[str]:
-    """What motor and belt do not bear of torques, N mm: gravity's, with acceleration the peak's."""
+    """Overloads of motor and belt by torques, N mm: gravity's, with acceleration the peak's."""
     spec = context.export.spec.prototype
     efficiency, torque = EFFICIENCY[spec.base.drive], motor * gear.ratio
     if torque * efficiency < spec.motion.safety * peak:
@@ -215,7 +215,7 @@ def _shaft_limit(motor: str) -> float:
 
 
 def _pin_faults(context: PrototypeContext, balance: Balance) -> Iterator[str]:
-    """What the zero pin does not bear of the largest torque of gravity at any angle."""
+    """Overload of the zero pin by the largest torque of gravity at any angle."""
     turn = np.linspace(0, 2 * np.pi, FALL_STEPS)
     force = np.abs(balance.torque(context, turn)).max() / PIN_OUT_MM
     shear, pressure = force / (np.pi / 4 * PIN_MM**2), force / (PIN_MM * DISC_MM)
@@ -225,7 +225,7 @@ def _pin_faults(context: PrototypeContext, balance: Balance) -> Iterator[str]:
 
 
 def _held_by(bought: Mapping[str, str | None]) -> str:
-    """What holds the base without power, in words."""
+    """The part that holds the base without power, in words."""
     return f"with {bought['brake']}" if bought.get("brake") else "without a brake"
 
 

@@ -118,7 +118,7 @@ def _fastener_faults(context: PrototypeContext, solids: Mapping[str, TextSolid])
 def faults_of(
     one: PlacedFastener, others: list[PlacedFastener], solids: Mapping[str, TextSolid]
 ) -> Iterator[str]:
-    """What is wrong with a fastener."""
+    """Faults of a fastener."""
     size, missing = (
         size_of(one.part),
         [name for name in (one.name, *one.through) if name not in solids],

@@ -64,7 +64,7 @@ def _chunks(data: bytes) -> tuple[bytes, bytes]:
 
 
 def _written(given: Any, binary: bytes) -> tuple[dict[str, Any], dict[str, DrawnBody]]:
-    """What tbcad writes of the names, groups, colours and numbers of a document; its bodies.
+    """Names, groups, colours and numbers of a document in the form of tbcad; its bodies.
 
     ValueError, LookupError, TypeError: they are none, or not those of bodies.
     """

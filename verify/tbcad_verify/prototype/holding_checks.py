@@ -1,4 +1,4 @@
-"""What holds each ball: loads by turning the base, measured pockets.
+"""Holding of each ball: loads by turning the base, measured pockets.
 
 Pull of a disc magnet on a steel ball or on another disc magnet is that of rings of magnetic charge.
 The faces of a magnet are discs of charge of density Br / mu0; each is divided into rings. What a
@@ -170,7 +170,7 @@ def _quadrature(count: int) -> tuple[Floats, Floats]:
 
 
 def _images(rings: Rings, ball: float) -> Rings:
-    """What a ball about the origin answers: images of the rings, and their charge at its centre."""
+    """Response of a ball about the origin: images of the rings, and their charge at its centre."""
     radius, place, charge = rings
     away = np.hypot(radius, place)
     share, image = (ball / away) ** 2, -charge * ball / away

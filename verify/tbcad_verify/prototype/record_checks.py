@@ -88,7 +88,7 @@ def _size_faults(context: PrototypeContext) -> Iterator[str]:
     depth = dot(p - b, balls.columns("nx", 3))
     cap = (body <= radius) & (depth > 0) & (depth <= body + POSE_MM) & np.isnan(balls.mass_g)
     bad = np.flatnonzero(~(good & np.where(balls.cap, cap, ball)))
-    yield from (f"{name} has not its diameter, or no mass of it" for name in balls.names(bad))
+    yield from (f"{name}: wrong diameter or mass" for name in balls.names(bad))
 
 
 def twins(context: PrototypeContext) -> list[str]:

@@ -1,4 +1,4 @@
-"""What weight does to the carrier: how far the balls move besides what a calibration finds.
+"""Sag of the carrier: how far balls move besides the motion that a calibration finds.
 
 A calibration finds a motion of the whole base for each stop, and where the balls are on it. What is
 left is the change of the carrier's shape from stop to stop. Of that motion a ball's mean over its
@@ -40,14 +40,14 @@ def checks(
     measured: MeasuredPrototype,
     drawn: Mapping[str, Shape],
 ) -> list[Check]:
-    """What is left of the carrier's sag after six freedoms at each stop, and that of the file.
+    """Residual of the carrier's sag after six freedoms at each stop, and that of the file.
 
     With a drive that has no shaft of its own only that seats are not placed against any. Unknown:
     there is no sag.csv, or not of these stops and balls.
     """
     if SHAFT not in drawn:
         return [_beside(names[2], context, measured, 0.0)]
-    table = require(context.prototype.sag, "the export has no sag.csv")
+    table = require(context.prototype.sag, "the build has no sag.csv")
     turn = context.base_rotation(np.radians(context.prototype.stops.angle)).as_matrix()
     down = np.array([0.0, 0.0, -1.0]) @ turn
     own = np.einsum("kab,sb->ska", _by_weight(context, parts, measured, drawn), down)

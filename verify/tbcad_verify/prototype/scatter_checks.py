@@ -1,4 +1,4 @@
-"""What the roughness of the balls leaves of the picture's contrast, by their grades.
+"""Contrast that the roughness of the balls leaves, by their grades.
 
 A surface of roughness Rq sends 1 - exp(-(4 pi Rq cos(theta) / lambda)^2) of what it reflects past
 the mirror's direction (total integrated scatter: Bennett and Porteus 1961; Beckmann). Rq is 1.25

@@ -45,7 +45,7 @@ ZERO_DISC = "zero_disc"  # of the base, beside its carrier
 
 @dataclass(frozen=True)
 class Findings:
-    """What several checks need: fields, and methods whose values are worked out once."""
+    """Shared by several checks: fields, and methods whose values are computed once."""
 
     context: PrototypeContext  # the record
     parts: list[MeasuredPart]  # all printed parts
@@ -101,7 +101,7 @@ class Findings:
         return measure_prototype(self.context, *given)
 
     def views(self) -> BallViews:
-        """What each mirror's ball shows."""
+        """View by each mirror's ball."""
         return ball_views(self["measured"], pixel_rays(self["measured"]))
 
     def bodies(self) -> AssembledBodies:

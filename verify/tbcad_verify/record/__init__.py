@@ -1,1 +1,1 @@
-"""The records of an export: untrusted files, read strictly."""
+"""The records of a build: untrusted files, read strictly."""

@@ -1,4 +1,4 @@
-"""The records of an export: design.json, mirrors.csv, manifest.json and those of a prototype.
+"""The records of a build: design.json, mirrors.csv, manifest.json and those of a prototype.
 
 Only requirements and poses are taken from here. What the mirrors are is measured on the mesh.
 """
@@ -150,14 +150,14 @@ class Design(Strict):
 
 
 class Entry(Strict):
-    """What the manifest says of a file."""
+    """A file's entry in the manifest."""
 
     size: int
     sha256: str
 
 
 class Manifest(Strict):
-    """manifest.json: every file of the export. Builds of earlier versions tell no kind."""
+    """manifest.json: every file of the build. Builds of earlier versions tell no kind."""
 
     kind: Literal["build"] = "build"
     files: dict[str, Entry] = Field(min_length=1)
@@ -199,7 +199,7 @@ class Export:
 
     @property
     def rings(self) -> tuple[PrintedPart, ...]:
-        """What carries the shell's lamps."""
+        """The part that carries the shell's lamps."""
         return (self.lamps.ring,) if self.lamps else ()
 
     @property
@@ -229,7 +229,7 @@ class Export:
 
 
 def listed_names(folder: Path) -> frozenset[str]:
-    """Names of all files that belong to an export, by its manifest alone.
+    """Names of all files that belong to a build, by its manifest alone.
 
     BadExport: the folder is no export, which is told at once however much is in it.
     """

@@ -18,14 +18,14 @@ from tbcad_verify.errors import BadExport
 MAX_BYTES = 4 * 10**9
 HEAD = 84  # bytes that tell what a file is
 MAX_TEXT_BYTES = 256 * 10**6
-AGAIN = "write the export again with `tbcad build`"
+AGAIN = "write it again with `tbcad build`"
 
 
 @dataclass(frozen=True)
 class FileBytes:
     """One file as it was when it was read: what is hashed is what is parsed."""
 
-    name: str  # path inside the export, with forward slashes
+    name: str  # path inside the build, with forward slashes
     data: NDArray[np.uint8]  # the bytes, shape (size,), uint8
     sha256: str  # hex digest of exactly these bytes
 
@@ -54,7 +54,7 @@ def open_folder(folder: Path) -> Path:
 
 
 def locate(folder: Path, name: str) -> Path:
-    """The path of a regular file inside the export, and never of anything outside it.
+    """The path of a regular file inside the build, and never of anything outside it.
 
     BadExport: the name leaves the folder, or the file is missing, no regular file or too big.
     """
@@ -66,7 +66,7 @@ def locate(folder: Path, name: str) -> Path:
     except (OSError, RuntimeError) as error:
         raise BadExport(f"{name}: missing from {folder}; {AGAIN}") from error
     if not real.is_relative_to(folder):
-        raise BadExport(f"{name}: a link that leads out of the export; only files inside count")
+        raise BadExport(f"{name}: a link that leads out of the build; only files inside count")
     if not stat.S_ISREG(info.st_mode):
         raise BadExport(f"{name}: not a regular file; {AGAIN}")
     if info.st_size > MAX_BYTES:
@@ -127,7 +127,7 @@ def digest(folder: Path, name: str) -> tuple[int, str]:
 
 
 def stamps(folder: Path, names: Iterable[str]) -> dict[str, tuple[int, ...]]:
-    """What tells that a file was replaced or written to: device, inode, size and times, by name.
+    """Signs that a file was replaced or written to: device, inode, size and times, by name.
 
     Files that are not there are left out.
     """
@@ -150,11 +150,11 @@ def listing(folder: Path) -> frozenset[str]:
 
 
 def refuse_unsafe(name: str) -> None:
-    """Refuse names that lead, or might lead, out of the export.
+    """Refuse names that lead, or might lead, out of the build.
 
     BadExport: absolute, with `..`, a drive, or another system's separators.
     """
     parts = PurePosixPath(name).parts
     bad = not parts or name.startswith("/") or ".." in parts or "\\" in name or "\0" in name
     if bad or ":" in parts[0]:
-        raise BadExport(f"{name!r}: not a plain file name inside the export; {AGAIN}")
+        raise BadExport(f"{name!r}: not a plain file name inside the build; {AGAIN}")

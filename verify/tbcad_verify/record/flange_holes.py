@@ -83,7 +83,7 @@ def flanges(export: Export, camera: Camera, beyond: float) -> tuple[Flange, Flan
 
 
 def hole_faults(holes: Sequence[Hole], wanted: Sequence[Flange], limits: HoleLimits) -> list[str]:
-    """What is wrong with the holes of a half: number, diameter, direction, depth and place."""
+    """Faults of the holes of a half: number, diameter, direction, depth and place."""
     faults: list[str] = []
     for flange in wanted:
         mine = [hole for hole in holes if _is_along(hole, flange)]
@@ -210,7 +210,7 @@ def _told(plane: str, way: float) -> str:
 def blind_hole_faults(
     holes: Sequence[Hole], export: Export, camera: str, limits: HoleLimits
 ) -> list[str]:
-    """What is wrong with the holes of one camera's negative.
+    """Faults of the holes of one camera's negative.
 
     `holes`: of its seam (along x) and its foot (along z).
     `limits`: by how much sizes and places may be off.

@@ -106,7 +106,7 @@ class Balls(Columns):
         return self.columns("sag_x_mm", 3)
 
     def names(self, which: NDArray[np.integer]) -> list[str]:
-        """What reports call them."""
+        """Their name in reports."""
         return [f"ball {k + 1}" for k in which.tolist()]
 
 
@@ -223,7 +223,7 @@ class Lamp(Strict):
 
 
 class Lamps(Strict):
-    """What lights the object."""
+    """The lamps of the object."""
 
     strip: str = Field(max_length=WIDEST)  # name of the LED strip in the parts list
     strips: int = Field(ge=1, le=MOST)  # side by side on each lamp
@@ -331,7 +331,7 @@ class Assembly(Strict):
 
 
 class Controller(Strict):
-    """What drives motion and lights."""
+    """The controller of motion and lights."""
 
     board: str = Field(max_length=WIDEST)  # name in the parts list
 

@@ -210,7 +210,7 @@ class PrototypeSpec(Strict):
     frame: FrameSpec
 
     def left_open(self) -> list[str]:
-        """Keys without a value, which only an export without a prototype may have."""
+        """Keys without a value, which only a build without a prototype may have."""
         sections = {
             "": self,
             "base.": self.base,

@@ -1,4 +1,4 @@
-"""What manufacturing errors leave of a design: simulated by others, shown with the verification."""
+"""Yields by manufacturing errors: simulated by others, shown with the verification."""
 
 from __future__ import annotations
 

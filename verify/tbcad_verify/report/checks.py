@@ -22,7 +22,7 @@ class Check:
     """One figure and its limit."""
 
     name: str  # what was measured
-    file: str  # in which file of the export
+    file: str  # in which file of the build
     passed: bool | None  # None is "unknown", which is not a pass
     measured: float | None  # the figure, or None
     limit: float | None  # of the figure; None if it informs only

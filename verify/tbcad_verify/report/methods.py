@@ -1,4 +1,4 @@
-"""What each check compares, how, what to do when it fails (checks.toml); key figures."""
+"""Question, method, limit and remedy of each check (checks.toml); key figures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ QUESTIONS = {
     "fit": "Do the parts fit?",
     "move": "Does it move safely?",
 }
-"""What a person asks, in the order of checks.toml."""
+"""Questions of the checks, in the order of checks.toml."""
 
 
 @dataclass(frozen=True)
@@ -77,12 +77,12 @@ def method_of(check: str) -> tuple[Method, str] | None:
 
 
 def remedy(check: Check) -> str:
-    """What to do about a check that did not pass."""
+    """Remedy of a check that did not pass."""
     return UNKNOWN if check.passed is None else remedy_by_name(check.name)
 
 
 def remedy_by_name(check: str) -> str:
-    """What to do about a check that fails, by its name."""
+    """Remedy of a check that fails, by its name."""
     found = method_of(check)
     return found[1] if found else ELSE
 
@@ -142,7 +142,7 @@ def checks_named(checks: Sequence[Check], name: str) -> list[Check]:
 
 
 def _requested_printers(report: Report) -> list[KeyFigure]:
-    """What was printed on request has a limit; printers that nobody asked for inform only."""
+    """Printers that were asked for have a limit; others inform only."""
     printers = dict.fromkeys(row["profile"] for row in report.printing)
     limited = {check.name for check in report.checks if check.limit is not None}
     names = [f"print {printer}" for printer in printers]

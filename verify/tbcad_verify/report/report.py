@@ -1,4 +1,4 @@
-"""The result of a verification: JSON in the export, a table and a verdict on screen."""
+"""The result of a verification: JSON in the build, a table and a verdict on screen."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Report:
         valleys: whether its mirrors meet in valleys, which solids have without a cutter's fillets.
         balls: number of the prototype's balls; 0 without a prototype.
         note: what the build says of itself, such as why a part was left out; "" for nothing.
-        folder: where the export lies.
+        folder: where the build lies.
         seconds: what the command took.
         as_made: simulated builds of the design; None if nobody simulated any.
     """

@@ -1,4 +1,4 @@
-"""What people see, 80 columns wide: a summary of at most fourteen lines; every check; printers."""
+"""Text for people, 80 columns wide: a summary of at most fourteen lines; every check; printers."""
 
 from __future__ import annotations
 

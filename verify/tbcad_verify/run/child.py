@@ -23,7 +23,7 @@ POLL_S = 0.02
 
 @dataclass(frozen=True)
 class Limits:
-    """What a child may use."""
+    """Resources that a child may use."""
 
     seconds: float = 300.0  # time from its start
     output: int = 1_000_000  # bytes printed

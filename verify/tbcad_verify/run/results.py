@@ -1,4 +1,4 @@
-"""What the stages measured, as plain data that another process can send."""
+"""Measurements of the stages, as plain data that another process can send."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PER_MIRROR = (
 
 @dataclass
 class Results:
-    """What one stage measured, or several."""
+    """Measurements of one stage, or several."""
 
     stages: list[str] = field(default_factory=list)  # titles of the stages begun
     checks: list[Check] = field(default_factory=list)  # in the order they were made

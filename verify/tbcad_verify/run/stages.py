@@ -56,7 +56,7 @@ READING, THREEMF, RECORD, MESHES, PRINTABILITY, SETUP, COVERAGE, PIXELS = SHELL_
 
 
 def stage_titles(export: Export) -> tuple[str, ...]:
-    """Titles of the stages that an export has, in order."""
+    """Titles of the stages that a build has, in order."""
     mandrels = (MANDRELS,) if export.mandrels else ()
     lamps = (LAMPS,) if export.lamps else ()
     return (*SHELL_STAGES, *mandrels, *lamps, *(PROTOTYPE_STAGES if export.prototype else ()))
@@ -74,7 +74,7 @@ def run_stages(
     `printers`: profiles that every part must suit; without any, the built-in ones inform only.
     `cutter_mm`: radius of a ball that is put on all mirrors; None: no ball is.
 
-    BadExport: the folder is not a readable export, or a profile cannot be used.
+    BadExport: the folder is not a readable build, or a profile cannot be used.
     """
     profiles = [load(name) for name in printers or built_in()]
     sink(Results(stages=[READING]))
@@ -194,7 +194,7 @@ def _verify_lamps(
 def _shell_measures(
     shell: ShellPart, measured: Mapping[str, PartMeasures], first: RayScene | None
 ) -> PartMeasures:
-    """What printers need to know of a shell; of a mirror image it is known already.
+    """Figures of a shell for printers; those of a mirror image are known already.
 
     `measured`: shells before it.
     `first`: scene of the first of two, if the second is its image.

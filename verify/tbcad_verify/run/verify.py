@@ -1,4 +1,4 @@
-"""The verification of an export: all stages, then one report."""
+"""The verification of a build: all stages, then one report."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Steps = tuple[Files, Comparisons, list[Check]]
 
 @dataclass(frozen=True)
 class VerifyOptions:
-    """What else to verify, and how."""
+    """Options of a verification."""
 
     write: bool = True  # write verify.json into the folder
     # read the meshes in another process, so that a crash there becomes "unknown"
@@ -61,11 +61,11 @@ class VerifyOptions:
 def verify(
     folder: Path, progress: Progress = lambda _: None, options: VerifyOptions = VerifyOptions()
 ) -> Report:
-    """Verify an export, and write verify.json into it.
+    """Verify a build, and write verify.json into it.
 
     `progress`: called with the name of each stage before it starts.
 
-    BadExport: the folder is not a readable export, or cannot be written to; nothing is written.
+    BadExport: the folder is not a readable build, or cannot be written to; nothing is written.
     """
     for name in options.printers:
         load(name)
@@ -121,7 +121,7 @@ def watch(
 
     `stages`: function of a module; takes the arguments, and what receives results.
 
-    BadExport: the folder is not a readable export.
+    BadExport: the folder is not a readable build.
     """
     with Processes(1, seconds) as processes:
         try:
@@ -201,7 +201,7 @@ def _ask_programs(export: Export, results: CollectedResults, seconds: float) -> 
 def _expected(
     export: Export, part: PartFiles, spheres: int | None, results: Results
 ) -> ExpectedPart:
-    """What other programs should find in a part's files."""
+    """Contents that other programs should find in a part's files."""
     mass = results.masses.get(part.name)
     volume, area = (mass.volume, mass.area) if mass else (math.nan, math.nan)
     return ExpectedPart(

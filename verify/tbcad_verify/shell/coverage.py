@@ -56,7 +56,7 @@ ROUNDING_MM = 5e-3
 
 @dataclass(frozen=True)
 class Coverage:
-    """What each virtual camera sees."""
+    """Coverage of each virtual camera."""
 
     # (V,) diameter by facets, mm; 0 where the outline's image does not surround the object's
     # middle, NaN where a mirror is missing

@@ -1,4 +1,4 @@
-"""What a ball cutter reaches of the mirrors on a mesh.
+"""Reach of a ball cutter on the mirrors of a mesh.
 
 A ball touches each mirror at points that are spread evenly over its area, along the normals of the
 sphere through its corners. It reaches those where it cuts into no facet of the part.
@@ -39,7 +39,7 @@ TOLERANCE_MM = 5e-4
 
 @dataclass(frozen=True)
 class CutterReach:
-    """What a ball reaches of M mirrors; NaN for those that a mesh has not."""
+    """Reach of a ball on M mirrors; NaN for those that a mesh has not."""
 
     share: Floats  # (M,) of the mirror's area that it touches without cutting in, 0 to 1
     depth: Floats  # (M,) by how much it cuts in at most, mm

@@ -70,7 +70,7 @@ def checks(lamps: ShellLamps, ring: Mesh, setup: OpticalSetup) -> list[Check]:
 
 @dataclass
 class ShellLight:
-    """What the checks measure on; the light is followed once."""
+    """Lamps, ring and mirrors that the checks measure on; the light is followed once."""
 
     lamps: ShellLamps  # as recorded
     ring: Mesh  # of the ring in its own frame
@@ -115,7 +115,7 @@ def asked_faults(asked: ShellLampsSpec, lamps: ShellLamps, ring: Mesh) -> list[s
 
 
 def ring_faults(lamps: ShellLamps, ring: Mesh, camera: Camera) -> list[str]:
-    """What is wrong with the ring on one camera."""
+    """Faults of the ring on one camera."""
     axes = np.stack([camera.right, -camera.down, -camera.forward])
     middle = camera.pinhole + lamps.front_mm * camera.forward
     mine = [one for one in lamps.places if one.camera == camera.id]

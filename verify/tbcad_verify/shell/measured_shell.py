@@ -68,7 +68,7 @@ class ShellPart:
 
 
 def measure_shells(export: Export, stls: list[Facets]) -> list[ShellPart]:
-    """Every shell of an export, given the facets of each."""
+    """Every shell of a build, given the facets of each."""
     if _second_is_image(export, stls):
         first = _measure_shell(export, export.parts[0], stls[0])
         return [first, first.mirror_image(export.parts[1])]
@@ -140,7 +140,7 @@ def flipped_recovery(recovery: Recovery) -> Recovery:
 
 
 def flipped_measures(measures: PartMeasures, mesh: Mesh, mass: MassProperties) -> PartMeasures:
-    """What a printer needs to know of the mirror image, given its mesh and mass."""
+    """Figures of the mirror image for printers, given its mesh and mass."""
     walls, holes = measures.walls, measures.holes
     return replace(
         measures,

@@ -1,4 +1,4 @@
-"""What closes a shell behind its mirrors, measured on its mesh: wall and holes.
+"""Casing of a shell behind its mirrors, measured on its mesh: wall and holes.
 
 Rays start at the valleys between mirrors and leave through the back, along the normal of the
 ellipsoid. The facets that they meet say how far the back is beyond the ellipsoid, the valleys how

@@ -84,7 +84,7 @@ class OpticalSetup:
         return owners(self.match.segment, self.recovery.segments.count)
 
     def sensor_scene(self, camera: Camera) -> SensorScene:
-        """What light meets, for one camera."""
+        """Surfaces that light meets, for one camera."""
         owner, mine = self.owner(), self.mine(camera)
         owner = np.where((owner >= 0) & mine[owner], owner, -1)
         label = self.recovery.segments.label
@@ -113,7 +113,7 @@ class OpticalSetup:
 
 @dataclass(frozen=True)
 class SensorScene:
-    """What light meets, for one camera."""
+    """Surfaces that light meets, for one camera."""
 
     setup: OpticalSetup  # all parts
     camera: Camera  # the real camera

@@ -1,4 +1,4 @@
-"""What a mirror sees: rays from the pinhole to the edge of the mirror, reflected.
+"""View by a mirror: rays from the pinhole to the edge of the mirror, reflected.
 
 The outline of a mirror is made of the mesh edges that separate its patch from others. The minimum
 distance from the origin of all rays reflected there is half the coverage diameter.

@@ -50,7 +50,7 @@ CLOSE_MM = 1e-4
 
 
 def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> MirrorChecks:
-    """What the sensor and the rim show, and the useful pixels of each recorded mirror (M,).
+    """Mirrors on the sensor and along the rim, and the useful pixels of each recorded mirror (M,).
 
     `seen`: what the mirrors cover; no rim is looked for where they do not reach. None takes
     them to reach the whole object.
@@ -78,7 +78,7 @@ def checks(setup: OpticalSetup, seen: Coverage | None, files: str) -> MirrorChec
 
 
 def _tallies(setup: OpticalSetup) -> list[light.PixelTally]:
-    """What each camera's pixels see; mirror images are not traced again."""
+    """Mirrors seen by each camera's pixels; mirror images are not traced again."""
     first, *others = setup.cameras
     tally = light.full_sensor(setup.sensor_scene(first))
     if setup.symmetric:

@@ -1,4 +1,4 @@
-"""A STEP file of an export: text and kernel read it in another process, and both are joined."""
+"""A STEP file of a build: text and kernel read it in another process, and both are joined."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def dataset(options: DatasetOptions, json: JsonResult = False) -> int:
 
 
 def _lines(record: dict[str, Any]) -> Iterator[str]:
-    """What is written first, then how well pinholes fit."""
+    """Lines on the files written, then on how well pinholes fit."""
     left_out, size = len(record["left_out"]), record.get("size_px")
     return result_lines(
         "dataset",

@@ -92,7 +92,7 @@ def optimize(options: OptimizeOptions, json: JsonResult = False) -> int:
 
 
 def _record(result: "SearchResult", files: tuple[Path, ...]) -> dict[str, object]:
-    """What was found, for other programs."""
+    """The designs found, for other programs."""
     return {
         "schema": "tbcad-optimize/1",
         "before": asdict(result.start),

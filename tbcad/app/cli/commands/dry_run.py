@@ -1,4 +1,4 @@
-"""What `tbcad build --dry-run` prints: a dozen lines, or a record."""
+"""Output of `tbcad build --dry-run`: a dozen lines, or a record."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -53,7 +53,8 @@ def overview_lines(figures: Overview, seconds: float) -> Iterator[str]:
         radii=radii,
         shells=figures.shell_prints and _print_text(figures.shell_prints),
         prototype=made,
-        caps=f" and {made.caps} caps" if made and made.caps else "",
+        balls=made and _counted(made.balls, "ball"),
+        caps=f" and {_counted(made.caps, 'cap')}" if made and made.caps else "",
         ball_price=made and _price_text(made.ball_price),
         prints=made and _print_text(made.prints),
         note=figures.note,
@@ -72,6 +73,10 @@ def _print_text(figures: PrintEstimate) -> str:
         f"{figures.volume_cm3:.0f} cm3, about {figures.mass_g:.0f} g, {figures.hours:.0f} h, "
         f"{_price_text(figures.price)} by FDM"
     )
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def _price_text(prices: Mapping[str, float]) -> str:

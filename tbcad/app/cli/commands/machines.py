@@ -160,8 +160,8 @@ def _few(names: list[str]) -> str:
 def as_built(options: AsBuiltOptions, json: JsonResult = False) -> int:
     """Write the measured spheres of a calibrated prototype as exact, coloured solids (STEP).
 
-    The colour says how far a ball's centre is off, in micrometres; legend.png and deviations.csv
-    give the scale and all figures.
+    The colour is the position error of a ball's centre, in micrometres; legend.png and
+    deviations.csv give the scale and all figures.
     """
     record = on_screen(1, "as_built", options)
     print_result(record, result_lines("as-built", out=options.out, **record), json)

@@ -43,7 +43,7 @@ def compared_files(out: Path) -> list[Path]:
 
 
 def true_picture(scene: "Scene", at: "Camera", samples: int = 4) -> "Bytes":
-    """What a pinhole camera would see, ray-traced with samples x samples rays a pixel."""
+    """Picture of a pinhole camera, ray-traced with samples x samples rays a pixel."""
     from tbcad.light.simulate.capture.photograph import to_bytes
     from tbcad.light.simulate.views.refocus import pinhole_picture
 

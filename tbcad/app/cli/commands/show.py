@@ -113,7 +113,7 @@ def show(
 def _shown(
     file: Path, method: str | None
 ) -> "Iterator[tuple[MirrorTiles | Field, MirrorTiles | None]]":
-    """What views are made from, a light field or a field; and the light field, if there is one."""
+    """Source of the views, a light field or a field; and the light field, if there is one."""
     from tbcad.light.reconstruction.field import SUFFIX, read_field, wanted_field
     from tbcad.light.simulate.capture.light_field import LightField
     from tbcad.light.simulate.views.mirror_tiles import MirrorTiles

@@ -219,7 +219,7 @@ def _check_beside(
 
 
 Contents: TypeAlias = dict[str, Callable[[], bytes]]
-"""What makes the files beside a picture, by what each shows and its suffix."""
+"""Writers of the files beside a picture, by subject and suffix."""
 
 
 def _of_field(made: "Field", at: "Camera") -> tuple["Bytes", Contents]:

@@ -1,4 +1,4 @@
-"""What is bought, printed and put together: heavy libraries are imported inside the commands."""
+"""Parts, drawings, assembly: heavy libraries are imported inside the commands."""
 
 from pathlib import Path
 from typing import Annotated

@@ -90,7 +90,7 @@ CHECKS = {"klipper": "faults"}
 
 
 def program_faults(context: PrototypeContext) -> Iterator[str]:
-    """What is wrong with the program, and what it does otherwise than the plan."""
+    """Faults of the program, and its deviations from the plan."""
     if is_klipper(context):
         yield from klipper_faults(context)
         return
@@ -99,7 +99,7 @@ def program_faults(context: PrototypeContext) -> Iterator[str]:
 
 
 def deviations(context: PrototypeContext, machine: Machine) -> Iterator[str]:
-    """What a machine did otherwise than the design asks for."""
+    """Deviations of a machine's actions from the design."""
     yield from _travel(context, machine)
     motion, stops = context.export.spec.prototype.motion, context.prototype.stops
     lights = expected_lights(context)
@@ -158,7 +158,7 @@ def _unlike_light(
 
 
 def _unlike_motion(one: Photograph, motion: MotionSpec, switched: bool) -> Iterator[str]:
-    """What is wrong with the motion about one photograph; switched: lights are."""
+    """Faults of the motion about one photograph; switched: lights are."""
     if switched and one.lit < motion.light_s - PROGRAM_S:
         yield f"{one.lit:g} s after a light was switched"
     if one.settled < motion.settle_s - PROGRAM_S:
@@ -212,7 +212,7 @@ def is_klipper(context: PrototypeContext) -> bool:
 
 
 def klipper_faults(context: PrototypeContext) -> Iterator[str]:
-    """What is wrong with Klipper's program, run by the machine that runs G-code."""
+    """Faults of Klipper's program, run by the machine that runs G-code."""
     text = context.prototype.klipper
     motion, (switch, homed) = context.export.spec.prototype.motion, homing(context)
     machine = run_klipper(text, motion.axis, switch, switch + motion.home_trim_deg)

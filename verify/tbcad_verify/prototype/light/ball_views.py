@@ -1,4 +1,4 @@
-"""What every mirror's ball shows at its stop: coverage, and an unobstructed path for the light.
+"""View by every mirror's ball at its stop: coverage, and an unobstructed path for the light.
 
 Rays of the shell's picture are rotated as the picture is, reflected by the balls, and stopped by
 what is in their way.
@@ -261,7 +261,7 @@ def pixel_rays(measured: MeasuredPrototype) -> PixelRays:
 
 
 class Reflecting(Protocol):
-    """What takes directions of the shell's picture to rays after the balls."""
+    """Map from directions of the shell's picture to rays after the balls."""
 
     def reflected(self, mirror: Ints, d: Floats) -> tuple[Floats, ReflectedRays]:
         """Directions (3, N) of mirrors' cells as they meet the balls, and their reflections."""
@@ -269,7 +269,7 @@ class Reflecting(Protocol):
 
 @dataclass(frozen=True)
 class RayTransfer:
-    """What takes directions of the shell's picture to rays on the balls, for m mirrors."""
+    """Map from directions of the shell's picture to rays on the balls, for m mirrors."""
 
     measured: MeasuredPrototype  # balls and obstacles
     # (3, 3, m) rotates directions of a mirror's cell in the shell's picture to where the merged

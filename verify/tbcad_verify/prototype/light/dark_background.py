@@ -1,4 +1,4 @@
-"""What the sensor sees beside mirrors: bodies that are listed as matt black, nothing else."""
+"""Background of the mirrors: the sensor sees bodies listed as matt black, nothing else."""
 
 from __future__ import annotations
 
