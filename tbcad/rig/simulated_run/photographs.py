@@ -23,7 +23,7 @@ from tbcad.rig.simulated_run.led_light import (
     balls_of_frame,
     led_light,
 )
-from tbcad.rig.simulated_run.sensor import (
+from tbcad.light.simulate.capture.sensor import (
     Image16,
     PixelMaps,
     Signal,

@@ -52,7 +52,7 @@ from tbcad.rig.simulated_run.photographs import (
     SimulatedRun,
     phases_of,
 )
-from tbcad.rig.simulated_run.sensor import Image16, SimulatedSensor
+from tbcad.light.simulate.capture.sensor import Image16, SimulatedSensor
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.prototype.gravity import read_gravity
 from tbcad.types import Progress

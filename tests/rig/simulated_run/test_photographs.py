@@ -26,7 +26,7 @@ from tbcad.rig.simulated_run.photographs import (
     blurred,
     phases_of,
 )
-from tbcad.rig.simulated_run.sensor import (
+from tbcad.light.simulate.capture.sensor import (
     PixelMaps,
     SimulatedSensor,
     generator,

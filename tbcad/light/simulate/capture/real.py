@@ -1,0 +1,204 @@
+"""A photograph as a real camera takes it: its lens, what mirrors scatter, and the sensor's noise.
+
+Each of a pixel's rays goes through a point of its own of the pupil, off the exact mirrors: defocus
+and astigmatism of the virtual images, and pixels that show two mirrors, are those of the rays.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.optics.camera import Camera, vignetting, without_distortion
+from tbcad.core.optics.lens import (
+    FINE,
+    KERNEL_PX,
+    RAY_SHARE,
+    PupilLens,
+    kernel_factors,
+    pixel_kernel,
+    pixels_of_samples,
+    pupil_points,
+)
+from tbcad.core.optics.reflection import scattered_share
+from tbcad.light.simulate.capture.photograph import CENTRE, RowBand, Tracer, row_bands, to_bytes
+from tbcad.light.simulate.capture.sensor import (
+    PixelMaps,
+    Signal,
+    SimulatedSensor,
+    generator,
+    recorded,
+)
+from tbcad.light.simulate.parallel import in_batches
+from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
+from tbcad.light.simulate.scene.rays import (
+    MirrorNumbers,
+    PupilPoint,
+    Shift,
+    TracedRays,
+    exact_tracer,
+    unit_directions,
+)
+from tbcad.light.simulate.scene.reflector import Reflector
+from tbcad.types import Bools, Bytes, Colours, Floats, Progress
+
+WHITE, WHITE_SHARE = 255.0, 0.9  # of a full pixel on the optical axis: white by its mirrors
+HALO_PX = 25  # width over which light of the Airy pattern beyond the kernel is spread
+NOISE_STREAM = 5000
+
+
+@dataclass(frozen=True)
+class RealOptics:
+    """What stands between the object and the numbers of a photograph."""
+
+    lens: PupilLens
+    reflectance: float  # of the mirrors
+    roughness_nm: float = 0.0  # their RMS roughness Rq
+    sensor: SimulatedSensor = field(default_factory=SimulatedSensor)
+    ray_share: float = RAY_SHARE  # of the pupil's diameter that rays go through
+    fine: int = FINE  # rays of a pixel along its sides
+    seed: int = 0  # of the noise
+
+    def kernel(self, camera: Camera) -> Floats:
+        """Shares of fine samples in a pixel of a camera, as of `pixel_kernel`."""
+        return pixel_kernel(self.lens.cutoff(camera.pixel_pitch), self.fine)
+
+
+@dataclass(frozen=True)
+class LensRay:
+    """One of the rays of each pixel."""
+
+    row: int  # among the fine samples of a pixel
+    column: int
+    shift: Shift  # its place from the pixel's centre, pixels
+    point: PupilPoint  # that it goes through
+    trace: Tracer
+
+
+def lens_rays(reflector: Reflector, optics: RealOptics) -> list[LensRay]:
+    """The rays of each pixel of a camera, over its fine samples and its pupil."""
+    camera, lens, count = reflector.camera, optics.lens, optics.fine
+    nearest = ((reflector.mirrors.apex - camera.pinhole) @ camera.forward).min()
+    margin = 1 + int(np.ceil(lens.blur_px(nearest, camera.pixel_pitch) / 2))
+    aside = optics.ray_share * lens.pupil_mm / 2 * pupil_points(count) @ camera.axes[:2]
+    rays = []
+    for row, column in np.ndindex(count, count):
+        x, y = ((column + 0.5) / count - 0.5, (row + 0.5) / count - 0.5)
+        point = PupilPoint(aside[row, column], lens.focus_mm, margin)
+        rays.append(LensRay(row, column, (x, y), point, exact_tracer(reflector, point)))
+    return rays
+
+
+def real_photograph(
+    reflector: Reflector, scene: Scene, optics: RealOptics, progress: Progress = lambda _: None
+) -> Iterator[RowBand]:
+    """The bands of a camera's picture from top to bottom; their rays go through the pinhole.
+
+    The picture is developed: a matt white surface in the best light is 255 by the mirrors.
+    """
+    camera, bands = reflector.camera, row_bands(reflector.camera.height_px)
+    work = partial(
+        _band, reflector, exact_tracer(reflector), lens_rays(reflector, optics), scene, optics
+    )
+    told = in_batches(work, bands, lambda rows: progress(f"row {rows.start} of {camera.height_px}"))
+    rays, light = zip(*told, strict=True)
+    whole = with_halo(np.concatenate(light), optics.kernel(camera))
+    mirror = np.concatenate([one.mirror for one in rays])
+    whole = with_scatter(whole, mirror, scattered_shares(reflector, optics.roughness_nm))
+    picture = developed(whole, camera, optics, ord(reflector.camera_id))
+    for rows, own in zip(bands, rays, strict=True):
+        yield RowBand(rows, own, picture[rows.start : rows.stop])
+
+
+def _band(
+    reflector: Reflector,
+    centre: Tracer,
+    through: list[LensRay],
+    scene: Scene,
+    optics: RealOptics,
+    rows: range,
+) -> tuple[TracedRays, Signal]:
+    """Rays through the pinhole, and light of pixels (h, w, 3), 0 to 255 and more."""
+    camera, n = reflector.camera, optics.fine
+    rays = centre(rows, CENTRE)
+    front, _ = _in_front(scene, camera.pinhole, unit_directions(camera, rows), rays)
+    rays = rays.without(front)
+    wide = range(rows.start - KERNEL_PX, rows.stop + KERNEL_PX)
+    edge, width = KERNEL_PX * n, n * camera.width_px
+    samples = np.zeros((n * len(wide), width + 2 * edge, 3), dtype=np.float32)
+    for ray in through:
+        own = samples[ray.row :: n, edge + ray.column : edge + width : n]
+        own[:] = _seen(camera, ray, scene, optics.reflectance, wide)
+    light = pixels_of_samples(samples, kernel_factors(optics.kernel(camera)), n)
+    # The light field's file has rays in this precision.
+    places = rays.origin.astype(np.float32), rays.direction.astype(np.float32)
+    return TracedRays(rays.mirror, *places), light
+
+
+def _seen(
+    camera: Camera, ray: LensRay, scene: Scene, reflectance: float, rows: range
+) -> Colours:
+    """What a ray of each pixel of some rows sees, (h, w, 3); without mirrors it is brighter."""
+    rays = ray.trace(rows, ray.shift)
+    colour = cast_rays(scene, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3)).colour
+    direction = ray.point.directions(camera, rows, ray.shift)
+    front, direct = _in_front(scene, camera.pinhole + ray.point.aside, direction, rays)
+    colour = colour.reshape(direction.shape)
+    colour[front] = direct.reshape(direction.shape)[front] / np.float32(reflectance)
+    return colour
+
+
+def _in_front(
+    scene: Scene, start: Floats, direction: Floats, rays: TracedRays
+) -> tuple[Bools, Colours]:
+    """Where (h, w) the object hides the mirrors, and its colours there, (h w, 3)."""
+    distance = np.where(rays.mirror == 0, np.inf, norm(rays.origin - start))
+    front, direct = object_in_front(scene, start, direction.reshape(-1, 3), distance.ravel())
+    return front.reshape(rays.mirror.shape), direct
+
+
+def with_halo(light: Signal, kernel: Floats) -> Signal:
+    """Light (h, w, c) with what of the Airy pattern is beyond the kernel, spread evenly."""
+    size = (HALO_PX, HALO_PX, 1)
+    return light + np.float32(1 - kernel.sum()) * uniform_filter(light, size, mode="constant")
+
+
+def scattered_shares(reflector: Reflector, roughness_nm: float) -> Floats:
+    """Share (m,) of the light that mirrors of an RMS roughness scatter, at their incidence."""
+    sight = unit(reflector.camera.pinhole - reflector.mirrors.apex)
+    seen = roughness_nm * dot(sight, reflector.mirrors.normal)
+    return np.array([scattered_share(one) for one in seen.tolist()])
+
+
+def with_scatter(light: Signal, mirror: MirrorNumbers, share: Floats) -> Signal:
+    """Light (h, w, c) of mirrors (h, w), from 1, of which each scatters its share over its picture.
+
+    A veil as of a surface that scatters alike over all that its mirror shows.
+    """
+    count = len(share) + 1
+    number = mirror.ravel()
+    area = np.maximum(np.bincount(number, minlength=count), 1)
+    flat = light.reshape(len(number), -1)
+    mean = [np.bincount(number, one, count) / area for one in flat.T]
+    lost = np.append(0.0, share).astype(np.float32)[number, None]
+    veil = np.column_stack(mean).astype(np.float32)[number]
+    return (flat + lost * (veil - flat)).reshape(light.shape)
+
+
+def developed(light: Signal, camera: Camera, optics: RealOptics, stream: int) -> Bytes:
+    """The picture (h, w, 3) of light: counted by the sensor, without the lens's own fall of light.
+
+    Its noise and its steps grow where that is corrected. Without dust and hot pixels.
+    """
+    seen = without_distortion(camera)
+    directions = unit_directions(camera, range(camera.height_px))
+    fall = vignetting(seen, directions).astype(np.float32)
+    maps = PixelMaps(fall, np.zeros(0, dtype=np.int64), np.zeros(0))
+    sensor = replace(optics.sensor, dark_electrons=0.0)
+    random = generator(optics.seed, NOISE_STREAM, stream)
+    numbers = recorded(sensor, maps, light * np.float32(WHITE_SHARE / WHITE), random)
+    gain = np.float32(WHITE / WHITE_SHARE / sensor.largest) / fall
+    return to_bytes(numbers * gain[..., None])
