@@ -46,3 +46,34 @@ class CameraSheet(Document):
     requirements: NeededLens
     mounted: str | None = None
     candidates: tuple[ListedLens, ...] = ()
+
+    @property
+    def in_use(self) -> ListedLens | None:
+        """The listed lens of the camera that a mount is made for; None without one."""
+        return next((one for one in self.candidates if one.name == self.mounted), None)
+
+
+class RealOpticsRecord(RecordSection):
+    """What of a real camera is in a capture, in capture.json and in its light field's facts.
+
+    Attributes:
+        lens: camera and lens that the prototype's mount is made for; None: one as needed.
+        reflectance: of the mirrors.
+        scattered: share of it that mirrors scatter, in the median and at most.
+        gloss: roughness of the object; None: it is matt.
+        white: of a full pixel, which has so many electrons.
+    """
+
+    lens: str | None
+    pupil_mm: Finite
+    focus_mm: Finite
+    wavelength_nm: Finite
+    rays_a_pixel: int
+    reflectance: Finite
+    scattered: tuple[Finite, Finite]
+    gloss: Finite | None
+    white: Finite
+    full_electrons: Finite
+    read_electrons: Finite
+    bits: int
+    left_out: tuple[str, ...]

@@ -9,6 +9,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tbcad.core.optics.reflection import roughness_nm
 from tbcad.core.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
 from tbcad.core.spec.errors import SpecError, short_text
 
@@ -20,6 +21,8 @@ BUILT_IN = ("metric", "inch")
 FINEST = "G10"  # that shops stock in all sizes it is sold in; finer ones are made to order
 MAX_DIAMETER_MM = 1000.0
 MAX_MASS_G = 1e7
+
+RQ_OVER_RA = 1.25  # of normally distributed heights
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,16 @@ def load_grades() -> dict[str, Grade]:
         sphericity, diameter, roughness, lot = map(float, deviations)
         grades[grade] = Grade(grade, sphericity, diameter, roughness, lot, standard)
     return grades
+
+
+def roughness_rq_nm(grade: str | None) -> float:
+    """RMS roughness at the limit of a grade, nm; of a cap, which has none, what it is polished to.
+
+    Rq is 1.25 Ra, as of normally distributed heights.
+    """
+    if grade is None:
+        return roughness_nm()
+    return 1000 * RQ_OVER_RA * load_grades()[grade].roughness_ra_um
 
 
 def load_catalogue(names: Iterable[str]) -> Catalogue:

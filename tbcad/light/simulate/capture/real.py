@@ -23,7 +23,7 @@ from tbcad.core.optics.lens import (
     pixels_of_samples,
     pupil_points,
 )
-from tbcad.core.optics.reflection import scattered_share
+from tbcad.core.optics.reflection import scattered_shares
 from tbcad.light.simulate.capture.photograph import CENTRE, RowBand, Tracer, row_bands, to_bytes
 from tbcad.light.simulate.capture.sensor import (
     PixelMaps,
@@ -35,7 +35,6 @@ from tbcad.light.simulate.capture.sensor import (
 from tbcad.light.simulate.parallel import in_batches
 from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
 from tbcad.light.simulate.scene.rays import (
-    MirrorNumbers,
     PupilPoint,
     Shift,
     TracedRays,
@@ -43,7 +42,7 @@ from tbcad.light.simulate.scene.rays import (
     unit_directions,
 )
 from tbcad.light.simulate.scene.reflector import Reflector
-from tbcad.types import Bools, Bytes, Colours, Floats, Progress
+from tbcad.types import Bools, Bytes, Colours, Floats, Ints, Progress
 
 WHITE, WHITE_SHARE = 255.0, 0.9  # of a full pixel on the optical axis: white by its mirrors
 HALO_PX = 25  # width over which light of the Airy pattern beyond the kernel is spread
@@ -56,7 +55,7 @@ class RealOptics:
 
     lens: PupilLens
     reflectance: float  # of the mirrors
-    roughness_nm: float = 0.0  # their RMS roughness Rq
+    roughness_nm: Floats  # their RMS roughness Rq, of all mirrors (1,), or of each ball (k,)
     sensor: SimulatedSensor = field(default_factory=SimulatedSensor)
     ray_share: float = RAY_SHARE  # of the pupil's diameter that rays go through
     fine: int = FINE  # rays of a pixel along its sides
@@ -68,28 +67,38 @@ class RealOptics:
 
 
 @dataclass(frozen=True)
-class LensRay:
+class LensSample:
     """One of the rays of each pixel."""
 
     row: int  # among the fine samples of a pixel
     column: int
     shift: Shift  # its place from the pixel's centre, pixels
     point: PupilPoint  # that it goes through
-    trace: Tracer
 
 
-def lens_rays(reflector: Reflector, optics: RealOptics) -> list[LensRay]:
-    """The rays of each pixel of a camera, over its fine samples and its pupil."""
-    camera, lens, count = reflector.camera, optics.lens, optics.fine
+def lens_samples(axes: Floats, optics: RealOptics, margin_px: int = 0) -> list[LensSample]:
+    """The rays of each pixel of a camera with axes (3, 3), over its fine samples and its pupil."""
+    lens, count = optics.lens, optics.fine
+    aside = optics.ray_share * lens.pupil_mm / 2 * pupil_points(count) @ axes[:2]
+    places = ((np.arange(count) + 0.5) / count - 0.5).tolist()
+    return [
+        LensSample(
+            row,
+            column,
+            (places[column], places[row]),
+            PupilPoint(aside[row, column], lens.focus_mm, margin_px),
+        )
+        for row, column in np.ndindex(count, count)
+    ]
+
+
+def mirror_rays(reflector: Reflector, optics: RealOptics) -> list[tuple[LensSample, Tracer]]:
+    """The rays of each pixel, each with what traces it off a camera's mirrors."""
+    camera = reflector.camera
     nearest = ((reflector.mirrors.apex - camera.pinhole) @ camera.forward).min()
-    margin = 1 + int(np.ceil(lens.blur_px(nearest, camera.pixel_pitch) / 2))
-    aside = optics.ray_share * lens.pupil_mm / 2 * pupil_points(count) @ camera.axes[:2]
-    rays = []
-    for row, column in np.ndindex(count, count):
-        x, y = ((column + 0.5) / count - 0.5, (row + 0.5) / count - 0.5)
-        point = PupilPoint(aside[row, column], lens.focus_mm, margin)
-        rays.append(LensRay(row, column, (x, y), point, exact_tracer(reflector, point)))
-    return rays
+    blur = float(optics.lens.blur_px(nearest, camera.pixel_pitch))
+    samples = lens_samples(camera.axes, optics, 1 + int(np.ceil(blur / 2)))
+    return [(one, exact_tracer(reflector, one.point)) for one in samples]
 
 
 def real_photograph(
@@ -101,37 +110,40 @@ def real_photograph(
     """
     camera, bands = reflector.camera, row_bands(reflector.camera.height_px)
     work = partial(
-        _band, reflector, exact_tracer(reflector), lens_rays(reflector, optics), scene, optics
+        _band, camera, exact_tracer(reflector), mirror_rays(reflector, optics), scene, optics
     )
     told = in_batches(work, bands, lambda rows: progress(f"row {rows.start} of {camera.height_px}"))
     rays, light = zip(*told, strict=True)
     whole = with_halo(np.concatenate(light), optics.kernel(camera))
     mirror = np.concatenate([one.mirror for one in rays])
-    whole = with_scatter(whole, mirror, scattered_shares(reflector, optics.roughness_nm))
-    picture = developed(whole, camera, optics, ord(reflector.camera_id))
+    whole = with_scatter(whole, mirror, mirror_scatter(reflector, optics)[mirror])
+    fall = vignetting(
+        without_distortion(camera), unit_directions(camera, range(camera.height_px))
+    )
+    picture = developed(whole, fall, optics, ord(reflector.camera_id))
     for rows, own in zip(bands, rays, strict=True):
         yield RowBand(rows, own, picture[rows.start : rows.stop])
 
 
 def _band(
-    reflector: Reflector,
+    camera: Camera,
     centre: Tracer,
-    through: list[LensRay],
+    through: list[tuple[LensSample, Tracer]],
     scene: Scene,
     optics: RealOptics,
     rows: range,
 ) -> tuple[TracedRays, Signal]:
     """Rays through the pinhole, and light of pixels (h, w, 3), 0 to 255 and more."""
-    camera, n = reflector.camera, optics.fine
+    n = optics.fine
     rays = centre(rows, CENTRE)
     front, _ = _in_front(scene, camera.pinhole, unit_directions(camera, rows), rays)
     rays = rays.without(front)
     wide = range(rows.start - KERNEL_PX, rows.stop + KERNEL_PX)
     edge, width = KERNEL_PX * n, n * camera.width_px
     samples = np.zeros((n * len(wide), width + 2 * edge, 3), dtype=np.float32)
-    for ray in through:
-        own = samples[ray.row :: n, edge + ray.column : edge + width : n]
-        own[:] = _seen(camera, ray, scene, optics.reflectance, wide)
+    for one, trace in through:
+        own = samples[one.row :: n, edge + one.column : edge + width : n]
+        own[:] = _seen(camera, one, trace(wide, one.shift), scene, (optics.reflectance, wide))
     light = pixels_of_samples(samples, kernel_factors(optics.kernel(camera)), n)
     # The light field's file has rays in this precision.
     places = rays.origin.astype(np.float32), rays.direction.astype(np.float32)
@@ -139,13 +151,17 @@ def _band(
 
 
 def _seen(
-    camera: Camera, ray: LensRay, scene: Scene, reflectance: float, rows: range
+    camera: Camera,
+    one: LensSample,
+    rays: TracedRays,
+    scene: Scene,
+    bright: tuple[float, range],
 ) -> Colours:
     """What a ray of each pixel of some rows sees, (h, w, 3); without mirrors it is brighter."""
-    rays = ray.trace(rows, ray.shift)
+    reflectance, rows = bright
     colour = cast_rays(scene, rays.origin.reshape(-1, 3), rays.direction.reshape(-1, 3)).colour
-    direction = ray.point.directions(camera, rows, ray.shift)
-    front, direct = _in_front(scene, camera.pinhole + ray.point.aside, direction, rays)
+    direction = one.point.directions(camera, rows, one.shift)
+    front, direct = _in_front(scene, camera.pinhole + one.point.aside, direction, rays)
     colour = colour.reshape(direction.shape)
     colour[front] = direct.reshape(direction.shape)[front] / np.float32(reflectance)
     return colour
@@ -166,39 +182,33 @@ def with_halo(light: Signal, kernel: Floats) -> Signal:
     return light + np.float32(1 - kernel.sum()) * uniform_filter(light, size, mode="constant")
 
 
-def scattered_shares(reflector: Reflector, roughness_nm: float) -> Floats:
-    """Share (m,) of the light that mirrors of an RMS roughness scatter, at their incidence."""
+def mirror_scatter(reflector: Reflector, optics: RealOptics) -> Floats:
+    """Share (1 + m,) of what mirrors reflect that they scatter, by number; 0 where there is none."""
     sight = unit(reflector.camera.pinhole - reflector.mirrors.apex)
-    seen = roughness_nm * dot(sight, reflector.mirrors.normal)
-    return np.array([scattered_share(one) for one in seen.tolist()])
+    cosine = dot(sight, reflector.mirrors.normal)
+    return np.append(0.0, scattered_shares(optics.roughness_nm * cosine))
 
 
-def with_scatter(light: Signal, mirror: MirrorNumbers, share: Floats) -> Signal:
-    """Light (h, w, c) of mirrors (h, w), from 1, of which each scatters its share over its picture.
+def with_scatter(light: Signal, mirror: Ints, share: Floats) -> Signal:
+    """Light (..., c) of mirrors (...), from 1, of which each pixel's share (...) is scattered.
 
-    A veil as of a surface that scatters alike over all that its mirror shows.
+    A veil: each mirror scatters alike over all that it shows.
     """
-    count = len(share) + 1
-    number = mirror.ravel()
-    area = np.maximum(np.bincount(number, minlength=count), 1)
-    flat = light.reshape(len(number), -1)
-    mean = [np.bincount(number, one, count) / area for one in flat.T]
-    lost = np.append(0.0, share).astype(np.float32)[number, None]
-    veil = np.column_stack(mean).astype(np.float32)[number]
-    return (flat + lost * (veil - flat)).reshape(light.shape)
+    number, flat = mirror.ravel(), light.reshape(-1, light.shape[-1])
+    area = np.maximum(np.bincount(number), 1)
+    mean = np.column_stack([np.bincount(number, one) / area for one in flat.T])
+    lost = share.astype(np.float32).reshape(-1, 1)
+    return (flat + lost * (mean.astype(np.float32)[number] - flat)).reshape(light.shape)
 
 
-def developed(light: Signal, camera: Camera, optics: RealOptics, stream: int) -> Bytes:
-    """The picture (h, w, 3) of light: counted by the sensor, without the lens's own fall of light.
+def developed(light: Signal, fall: Floats, optics: RealOptics, *stream: int) -> Bytes:
+    """The picture (..., 3) of light: counted by the sensor, without the lens's own fall of light.
 
-    Its noise and its steps grow where that is corrected. Without dust and hot pixels.
+    Noise and steps grow where that, a share (...), is corrected. Without dust and hot pixels.
     """
-    seen = without_distortion(camera)
-    directions = unit_directions(camera, range(camera.height_px))
-    fall = vignetting(seen, directions).astype(np.float32)
-    maps = PixelMaps(fall, np.zeros(0, dtype=np.int64), np.zeros(0))
+    maps = PixelMaps(fall.astype(np.float32), np.zeros(0, dtype=np.int64), np.zeros(0))
     sensor = replace(optics.sensor, dark_electrons=0.0)
-    random = generator(optics.seed, NOISE_STREAM, stream)
+    random = generator(optics.seed, NOISE_STREAM, *stream)
     numbers = recorded(sensor, maps, light * np.float32(WHITE_SHARE / WHITE), random)
-    gain = np.float32(WHITE / WHITE_SHARE / sensor.largest) / fall
+    gain = np.float32(WHITE / WHITE_SHARE / sensor.largest) / maps.transmission
     return to_bytes(numbers * gain[..., None])
