@@ -32,7 +32,7 @@ class PupilLens:
     focus_mm: float  # depth that is sharp, along the axis
 
     def cutoff(self, pitch: float) -> float:
-        """Finest lines that diffraction lets through, cycles a pixel of a width at unit distance."""
+        """Finest lines that diffraction lets through, cycles a pixel (its width at unit distance)."""
         return self.pupil_mm / WAVELENGTH_MM * pitch
 
     def blur_px(self, depth: Floats, pitch: float) -> Floats:
@@ -126,4 +126,4 @@ def defocused_mtf(share: Floats, waves: float, points: int = 400) -> Floats:
         both = (np.hypot(x - shift, y) < 1) & (np.hypot(x + shift, y) < 1)
         phase = 2 * np.pi * waves * ((x + shift) ** 2 - (x - shift) ** 2)
         result.append(np.cos(phase[both]).sum())
-    return np.array(result) / (np.hypot(x, y) < 1).sum()
+    return np.asarray(np.array(result) / (np.hypot(x, y) < 1).sum())

@@ -7,6 +7,7 @@ and astigmatism of the virtual images, and pixels that show two mirrors, are tho
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import uniform_filter
@@ -35,6 +36,7 @@ from tbcad.light.simulate.capture.sensor import (
 from tbcad.light.simulate.parallel import in_batches
 from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays, object_in_front
 from tbcad.light.simulate.scene.rays import (
+    MirrorNumbers,
     PupilPoint,
     Shift,
     TracedRays,
@@ -115,14 +117,12 @@ def real_photograph(
     told = in_batches(work, bands, lambda rows: progress(f"row {rows.start} of {camera.height_px}"))
     rays, light = zip(*told, strict=True)
     whole = with_halo(np.concatenate(light), optics.kernel(camera))
-    mirror = np.concatenate([one.mirror for one in rays])
+    mirror = np.concatenate([number for number, *_ in rays])
     whole = with_scatter(whole, mirror, mirror_scatter(reflector, optics)[mirror])
-    fall = vignetting(
-        without_distortion(camera), unit_directions(camera, range(camera.height_px))
-    )
+    fall = vignetting(without_distortion(camera), unit_directions(camera, range(camera.height_px)))
     picture = developed(whole, fall, optics, ord(reflector.camera_id))
     for rows, own in zip(bands, rays, strict=True):
-        yield RowBand(rows, own, picture[rows.start : rows.stop])
+        yield RowBand(rows, TracedRays(*own), picture[rows.start : rows.stop])
 
 
 def _band(
@@ -132,8 +132,8 @@ def _band(
     scene: Scene,
     optics: RealOptics,
     rows: range,
-) -> tuple[TracedRays, Signal]:
-    """Rays through the pinhole, and light of pixels (h, w, 3), 0 to 255 and more."""
+) -> tuple[tuple[MirrorNumbers, Any, Any], Signal]:
+    """Rays through the pinhole, in the file's precision, and light of pixels (h, w, 3)."""
     n = optics.fine
     rays = centre(rows, CENTRE)
     front, _ = _in_front(scene, camera.pinhole, unit_directions(camera, rows), rays)
@@ -145,9 +145,8 @@ def _band(
         own = samples[one.row :: n, edge + one.column : edge + width : n]
         own[:] = _seen(camera, one, trace(wide, one.shift), scene, (optics.reflectance, wide))
     light = pixels_of_samples(samples, kernel_factors(optics.kernel(camera)), n)
-    # The light field's file has rays in this precision.
     places = rays.origin.astype(np.float32), rays.direction.astype(np.float32)
-    return TracedRays(rays.mirror, *places), light
+    return (rays.mirror, *places), light
 
 
 def _seen(
@@ -183,7 +182,7 @@ def with_halo(light: Signal, kernel: Floats) -> Signal:
 
 
 def mirror_scatter(reflector: Reflector, optics: RealOptics) -> Floats:
-    """Share (1 + m,) of what mirrors reflect that they scatter, by number; 0 where there is none."""
+    """Share (1 + m,) of what mirrors reflect that they scatter, by number; 0 of no mirror."""
     sight = unit(reflector.camera.pinhole - reflector.mirrors.apex)
     cosine = dot(sight, reflector.mirrors.normal)
     return np.append(0.0, scattered_shares(optics.roughness_nm * cosine))
@@ -209,6 +208,7 @@ def developed(light: Signal, fall: Floats, optics: RealOptics, *stream: int) -> 
     maps = PixelMaps(fall.astype(np.float32), np.zeros(0, dtype=np.int64), np.zeros(0))
     sensor = replace(optics.sensor, dark_electrons=0.0)
     random = generator(optics.seed, NOISE_STREAM, *stream)
-    numbers = recorded(sensor, maps, light * np.float32(WHITE_SHARE / WHITE), random)
+    share = np.maximum(light, 0) * np.float32(WHITE_SHARE / WHITE)
+    numbers = recorded(sensor, maps, share, random)
     gain = np.float32(WHITE / WHITE_SHARE / sensor.largest) / maps.transmission
     return to_bytes(numbers * gain[..., None])

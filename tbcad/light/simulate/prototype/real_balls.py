@@ -33,23 +33,23 @@ def real_pixels(
 ) -> Bytes:
     """Pixels (n,) of the photograph of a stop, counted row by row, (n, 3).
 
-    The veil of each ball is the mean of those of its pixels that are asked for.
+    The veil of each ball is the mean of those of its pixels that are asked for; what of the Airy
+    pattern is beyond the kernel adds to it.
     """
     camera = run.camera
-    light = _light(run, scene, stop, optics, pixels)
+    kept = optics.kernel(run.reflector.camera).sum()
+    light = _light(run, scene, stop, optics, pixels) / np.float32(kept)
     row, column = np.divmod(pixels, camera.width_px)
     direction = camera.directions(np.column_stack([column, row]).astype(np.float64))
     hits = trace_balls(run, direction, np.full(len(pixels), stop))
     cosine = norm(hits.direction - direction) / 2  # of incidence: the normal bisects both
     rough = np.append(0.0, optics.roughness_nm)[hits.ball] * cosine
-    light = with_scatter(light, hits.ball, scattered_shares(rough))
+    light = with_scatter(light, hits.ball, scattered_shares(rough) + 1 - kept)
     half = ord(run.reflector.camera_id)
     return developed(light, vignetting(camera, direction), optics, half, stop)
 
 
-def _light(
-    run: PrototypeRun, scene: Scene, stop: int, optics: RealOptics, pixels: Ints
-) -> Signal:
+def _light(run: PrototypeRun, scene: Scene, stop: int, optics: RealOptics, pixels: Ints) -> Signal:
     """Light (n, 3) of pixels (n,) behind the lens, band by band."""
     camera = run.camera
     asked = np.zeros((camera.height_px + 2 * KERNEL_PX, camera.width_px), dtype=bool)

@@ -5,6 +5,7 @@ Facets are cut so small that shadows between corners are sharp to `SHADOW_MM`.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from tbcad.common.compiled import compiled_loop
 from tbcad.core.geometry.loop_vectors import dot as loop_dot
 from tbcad.core.geometry.loop_vectors import minus, plus_scaled, unit, vector
-from tbcad.core.geometry.vectors import dot, norm
+from tbcad.core.geometry.vectors import norm
 from tbcad.core.geometry.vectors import unit as unit_rows
 from tbcad.core.optics.mirror_light import Lamps, direct_light
 from tbcad.light.simulate.scene.lamps import EXPOSED, RectangularLamps, free_rays, tile_irradiance
@@ -73,10 +74,7 @@ def led_sources(lamps: Lamps) -> list[Source]:
         Lamps(*(values[k : k + 1] for values in (lamps.places, lamps.normals, lamps.candela)))
         for k in range(len(lamps.places))
     ]
-    return [
-        Source(one.places[0], lambda p, n, one=one: direct_light(one, p, n), k)
-        for k, one in enumerate(single)
-    ]
+    return [Source(one.places[0], partial(direct_light, one), k) for k, one in enumerate(single)]
 
 
 def direction_sources(directions: Floats, weights: Floats) -> list[Source]:
@@ -94,7 +92,7 @@ def cast_light(
 ) -> CastLight:
     """Light on an object's corners with the shadows that it casts on itself.
 
-    `rest` is light of no lamp. `white`: light that is shown as white; None: that of a good exposure.
+    `rest` is light of no lamp. `white`: what is shown as white; None: that of a good exposure.
     """
     lamps = 1 + max(source.lamp for source in sources)
     light = np.zeros((len(subject.points), 2, lamps))
@@ -194,7 +192,7 @@ def _lattice(count: int) -> Floats:
             if i + j < count - 1:
                 pieces.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
     second = np.array(pieces, dtype=np.float64) / count
-    return np.concatenate([1 - second.sum(axis=2, keepdims=True), second], axis=2)
+    return np.asarray(np.concatenate([1 - second.sum(axis=2, keepdims=True), second], axis=2))
 
 
 @dataclass(frozen=True)
@@ -214,8 +212,8 @@ class Gloss:
     ) -> Floats:
         """Light (k,) that goes back along rays from spots on facets with corners (k, 3).
 
-        `behind` and `weight` as of SurfaceHits; spots: places, unit normals, and directions in which
-        the rays go, (k, 3) each. 1 is that of a matt white surface in full light.
+        `behind` and `weight` as of SurfaceHits; spots: places, unit normals, and directions of the
+        rays, (k, 3) each. 1 is that of a matt white surface in full light.
         """
         side = behind.astype(np.int64)
         light = np.einsum("nk,nkl->nl", weight, self.light.lamp[corners, side])
@@ -225,7 +223,13 @@ class Gloss:
 
 @compiled_loop
 def _highlights(
-    place: Floats, normal: Floats, ray: Floats, light: Floats, lamp: Floats, alpha2: float, f0: float
+    place: Floats,
+    normal: Floats,
+    ray: Floats,
+    light: Floats,
+    lamp: Floats,
+    alpha2: float,
+    f0: float,
 ) -> Floats:
     total = np.zeros(len(place))
     for k in range(len(place)):

@@ -139,7 +139,6 @@ class SurfaceHits:
         met: Floats = np.where(behind, corners[..., 1], corners[..., 0])
         return np.asarray((met * self.weight).sum(axis=1))
 
-
     def highlights(self, subject: SceneObject, gloss: Gloss) -> Floats:
         """Light (k,) of lamps in microfacets that goes back along the rays."""
         spots = self.spots(subject)

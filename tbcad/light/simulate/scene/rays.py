@@ -132,8 +132,8 @@ def part_tracer(
 
     The mirror that a ray meets first is the one whose surface it enters first, since a cell is
     what no other sphere covers (DESIGN.md section 2). What lies beyond seam or foot is no mirror,
-    nor what lies beyond a wall of the mirror's own pedestal: there the ray ends in a groove. Rays go
-    through the pinhole, or another point of the pupil.
+    nor what lies beyond a wall of the mirror's own pedestal: there the ray ends in a groove.
+    Rays go through the pinhole, or another point of the pupil.
     """
     boxes, neighbours = reflector.boxes(), reflector.neighbours_at_edge()
     camera, edges = reflector.camera, (reflector.side, reflector.foot)
