@@ -32,7 +32,7 @@ class PupilLens:
     focus_mm: float  # depth that is sharp, along the axis
 
     def cutoff(self, pitch: float) -> float:
-        """Finest lines that diffraction lets through, cycles a pixel (its width at unit distance)."""
+        """Finest lines that diffraction lets through, cycles a pixel; `pitch`: at unit distance."""
         return self.pupil_mm / WAVELENGTH_MM * pitch
 
     def blur_px(self, depth: Floats, pitch: float) -> Floats:

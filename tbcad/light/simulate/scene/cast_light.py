@@ -173,7 +173,7 @@ def _pieces(subject: SceneObject, facets: Ints, count: int) -> list[Floats]:
 
     def spread(values: Floats) -> Floats:
         mixed = np.einsum("skc,fcx->fskx", weight, values)
-        return mixed.reshape(-1, 3, values.shape[-1])
+        return np.asarray(mixed.reshape(-1, 3, values.shape[-1]))
 
     own = subject.faces[facets]
     normals = unit_rows(spread(subject.normals[own]).reshape(-1, 3))
@@ -191,7 +191,7 @@ def _lattice(count: int) -> Floats:
             pieces.append([(i, j), (i + 1, j), (i, j + 1)])
             if i + j < count - 1:
                 pieces.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
-    second = np.array(pieces, dtype=np.float64) / count
+    second: Floats = np.array(pieces, dtype=np.float64) / count
     return np.asarray(np.concatenate([1 - second.sum(axis=2, keepdims=True), second], axis=2))
 
 
