@@ -9,7 +9,6 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tbcad.core.optics.reflection import roughness_nm
 from tbcad.core.spec.csv_rows import Row, check_unique, positive_number, read_rows, required_text
 from tbcad.core.spec.errors import SpecError, short_text
 
@@ -125,6 +124,8 @@ def roughness_rq_nm(grade: str | None) -> float:
     Rq is 1.25 Ra, as of normally distributed heights.
     """
     if grade is None:
+        from tbcad.core.optics.reflection import roughness_nm  # numpy: not for help and bad input
+
         return roughness_nm()
     return 1000 * RQ_OVER_RA * load_grades()[grade].roughness_ra_um
 
