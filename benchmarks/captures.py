@@ -28,6 +28,22 @@ def sharper(export: Path, folder: Path, subject: Path | None) -> list[Row]:
     ]
 
 
+def real(export: Path, folder: Path, subject: Path | None, rounds: int) -> list[Row]:
+    """Both photographs with real optics against ideal ones, as whole commands, in turns."""
+    taken: dict[str, list[float]] = {"ideal": [], "real": []}
+    for k in range(rounds + 1):  # the first pays for what is compiled
+        for optics, seconds in taken.items():
+            out = folder / f"{optics}-{k}"
+            words = [*arguments(export, out, subject), "--optics", optics]
+            seconds.append(run(folder, *words).cpu)
+            shutil.rmtree(out)
+    ideal, ours = (Figure(tuple(seconds[1:])) for seconds in taken.values())
+    return [
+        measured("tbcad capture --optics real, seconds of both cores", ours, "s"),
+        at_most("- over those of ideal", ours.over(ideal), 4),
+    ]
+
+
 def with_sensor(export: Path, folder: Path, times: int) -> None:
     """The record of an export, with so many times the pixels across and down."""
     document = json.loads((export / "design.json").read_bytes())

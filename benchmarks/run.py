@@ -38,6 +38,7 @@ def simulated(export: Path, folder: Path, rounds: int, subject: Path | None) -> 
     capture = folder / "capture"
     builds.run(folder, *captures.arguments(export, capture, subject))
     yield captures.sharper(export, folder, subject)
+    yield captures.real(export, folder, subject, rounds)
     from simulation import photographs, views
 
     yield photographs(export, folder, rounds, subject)

@@ -24,6 +24,7 @@ from tbcad.options.shared import (
 
 Target = Literal["nerfstudio", "colmap", "ngp-rays", "rays", "mitsuba"]
 Geometry = Literal["spheres", "mesh", "prototype"]
+Optics = Literal["ideal", "real"]
 AS_CAPTURED: tuple[Target, ...] = ("ngp-rays", "rays")
 SIZES_PX = (8, 4096)
 
@@ -139,6 +140,13 @@ class CaptureOptions(Call):
         "Mirrors of the record (spheres), of the exported meshes, or the balls of the prototype, "
         "stop by stop.",
     ] = "spheres"
+    optics: Optics = "ideal"
+    """ideal: a pinhole, without cast shadow and noise. real: the lens and pupil of camera.json
+    (defocus, astigmatism, diffraction, pixels that show two mirrors), shadows of the lamps, what
+    mirrors scatter, noise and steps of the sensor; without light that meets two mirrors."""
+    gloss: Annotated[float | None, typer.Option(min=0.05, max=1, metavar="ROUGHNESS")] = None
+    """With --optics real: the object's roughness, from 0.05 (polished) to 1; by default it is
+    matt."""
     own_light: bool = False
     """Light the object by the shell's own lamps and through its mirrors, in place of the built-in
     light; the prototype's balls are always lit by its lamps."""
@@ -157,6 +165,7 @@ class CaptureOptions(Call):
     def check(self) -> None:
         """Refuse options that exclude each other."""
         lights, single = str(self.lights), self.samples == 1
+        self._check_optics()
         if self.own_light and self.geometry == "prototype":
             raise InputError("--own-light is that of shells: leave out --prototype")
         if self.lights is not None and not single:
@@ -175,3 +184,18 @@ class CaptureOptions(Call):
             )
         if self.out is None and (self.lights, self.frames) != (None, None):
             raise InputError("lamps and frames are written beside the light field: give out")
+
+    def _check_optics(self) -> None:
+        if self.optics == "ideal":
+            if self.gloss is not None:
+                raise InputError("--gloss is of --optics real: add that, or leave it out")
+            return
+        not_with = {
+            "--mesh": self.geometry == "mesh",
+            "--samples": self.samples > 1,
+            "--lights": self.lights is not None,
+            "--frames": self.frames is not None,
+        }
+        for option, given in not_with.items():
+            if given:
+                raise InputError(f"--optics real is not for {option}: leave one of both out")

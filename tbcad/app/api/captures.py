@@ -14,8 +14,10 @@ from tbcad.options.shared import AnyPath
 if TYPE_CHECKING:
     from tbcad.light.reflectance.environment import LightFormat
     from tbcad.light.simulate.capture.light_field import LightField
-    from tbcad.light.simulate.capture.photograph import CameraPhotographs
+    from tbcad.light.simulate.capture.photograph import CameraPhotographs, Samples
+    from tbcad.light.simulate.capture.real import RealOptics
     from tbcad.light.simulate.scene.ray_casting import Scene
+    from tbcad.light.simulate.scene.reflector import ExportedDesign
 
 
 @keywords(CaptureOptions)
@@ -57,9 +59,11 @@ def photograph(options: CaptureOptions) -> Photographs:
     check_is_export(exports)
     check_is_object(options.object_file, options.up, options.unit)
     from tbcad.light.simulate.camera_photographs import camera_photographs
+    from tbcad.light.simulate.real_camera import real_optics
     from tbcad.light.simulate.scene.lamps import lit_by, read_lamps
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
     from tbcad.light.simulate.scene.ray_casting import prepared_scene
+    from tbcad.light.simulate.scene.real_scene import real_scene
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.light.simulate.scene.shell_lamps import lit_by_mirrors, read_shell_lamps
     from tbcad.output.folder import check_replaceable
@@ -70,25 +74,42 @@ def photograph(options: CaptureOptions) -> Photographs:
         check_replaceable(Path(options.out), "capture", options.force, sources)
     options.progress("object and scene")
     export = read_export(exports)
-    taken = ObjectOptions(options.fit, options.paint, options.up, options.unit)
-    subject = load_object(file, export.capture_mm, taken, options.answer)
+    how = ObjectOptions(options.fit, options.paint, options.up, options.unit)
+    subject = load_object(file, export.capture_mm, how, options.answer)
     lamps = read_lamps(export.folder) if options.geometry == "prototype" else None
-    subject = lit_by(lamps, subject) if lamps else subject
-    if options.own_light:
-        subject = lit_by_mirrors(export, read_shell_lamps(export.folder), subject)
     lit = "lamps of the prototype" if lamps else "lamps of the shell" if options.own_light else ""
-    scene = prepared_scene(subject)
-    cameras = camera_photographs(export, scene, options.geometry, options.samples, options.detail)
-    facts = {
+    facts: dict[str, Any] = {
         "object": subject.name,
         "design": export.spec.name,
         "n": export.spec.optics.n,
         "geometry": options.geometry,
         "samples": options.samples,
     } | ({"light": lit} if lit else {})
+    taken_by: Samples | RealOptics = options.samples
+    if options.optics == "real":
+        taken_by, record = real_optics(export, _roughness_nm(export, options))
+        shell_lamps = read_shell_lamps(export.folder) if options.own_light else None
+        scene = real_scene(export, subject, lamps or shell_lamps, options.gloss)
+        facts |= {"optics": "real", "real": record.model_dump() | {"gloss": options.gloss}}
+    else:
+        subject = lit_by(lamps, subject) if lamps else subject
+        if options.own_light:
+            subject = lit_by_mirrors(export, read_shell_lamps(export.folder), subject)
+        scene = prepared_scene(subject)
+    cameras = camera_photographs(export, scene, options.geometry, taken_by, options.detail)
     if subject.reading is not None:
         facts["object_file"] = asdict(subject.reading)
     return Photographs(cameras, scene, export.capture_mm, facts, sources)
+
+
+def _roughness_nm(export: ExportedDesign, options: CaptureOptions) -> list[float] | None:
+    """Of each ball of a prototype; None of a shell's mirrors."""
+    if options.geometry != "prototype":
+        return None
+    from tbcad.prototype.balls.catalogue import roughness_rq_nm
+    from tbcad.records.tables import BallRow
+
+    return [roughness_rq_nm(ball.grade) for ball in BallRow.read(export.folder)]
 
 
 def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict[str, Any]:

@@ -23,6 +23,8 @@ from tbcad.core.camera.requirements import (
     lens_for,
 )
 from tbcad.core.mirrors.array import MirrorArray
+from tbcad.records.camera_sheet import NAME as CAMERA_FILE
+from tbcad.records.camera_sheet import SCHEMA
 
 ENOUGH = 0.999  # of an angle or of pixels: figures of makers are rounded
 MAX_CLOSE_UP_DPT = 10.0  # the strongest close-up lens on sale
@@ -30,8 +32,6 @@ MAX_CLOSE_UP_DPT = 10.0  # the strongest close-up lens on sale
 # mount moves the camera along its axis.
 PUPIL_OF_LENGTH = 0.3
 MAX_BLUR = 1.5  # times the least blur that a stop can reach
-SCHEMA = "tbcad-camera/1"
-CAMERA_FILE = "camera.json"
 ISO = 400.0  # of the exposure that the sheet states
 LUX = 1000.0  # of its light where there are no lamps: about that of the default prototype's
 DIGITS = 9

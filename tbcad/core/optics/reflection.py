@@ -27,7 +27,12 @@ def scattered_share(roughness_nm: float, wavelength_nm: float = WAVELENGTH_NM) -
 
     Source: Bennett and Porteus, J. Opt. Soc. Am. 51 (1961) 123, at normal incidence.
     """
-    return float(-np.expm1(-((4 * np.pi * roughness_nm / wavelength_nm) ** 2)))
+    return float(scattered_shares(np.asarray(roughness_nm), wavelength_nm))
+
+
+def scattered_shares(roughness_nm: Floats, wavelength_nm: float = WAVELENGTH_NM) -> Floats:
+    """The same (...) of roughnesses (...); at an angle of incidence times its cosine (Beckmann)."""
+    return np.asarray(-np.expm1(-((4 * np.pi * roughness_nm / wavelength_nm) ** 2)))
 
 
 def roughness_nm(scattered: float = SCATTERED, wavelength_nm: float = WAVELENGTH_NM) -> float:

@@ -5,6 +5,7 @@ from functools import partial
 
 from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.light.simulate.capture.photograph import CameraPhotographs, RowBand, Samples, photograph
+from tbcad.light.simulate.capture.real import RealOptics, real_photograph
 from tbcad.light.simulate.prototype.merge import merge_run
 from tbcad.light.simulate.prototype.run import ball_reflector, prototype_runs, read_plan
 from tbcad.light.simulate.scene.ray_casting import Scene
@@ -16,17 +17,27 @@ from tbcad.types import Progress
 
 
 def camera_photographs(
-    export: ExportedDesign, scene: Scene, geometry: Geometry, samples: Samples, progress: Progress
+    export: ExportedDesign,
+    scene: Scene,
+    geometry: Geometry,
+    samples: Samples | RealOptics,
+    progress: Progress,
 ) -> CameraPhotographs:
     """Both cameras, each with what takes its photograph.
 
     By spheres of the record, meshes of the shells, or the prototype's balls, stop by stop; a pixel
-    is the mean of `samples`. InputError where files of that geometry are missing or broken.
+    is the mean of `samples`, or, by spheres and balls, as a real camera takes it. InputError where
+    files of that geometry are missing or broken.
     """
     if geometry == "prototype":
         both = prototype_runs(export.reflectors, read_plan(export))
         return [
             (ball_reflector(run), partial(merge_run, run, scene, samples, progress)) for run in both
+        ]
+    if isinstance(samples, RealOptics):
+        return [
+            (one, partial(real_photograph, one, scene, samples, progress))
+            for one in export.reflectors
         ]
     shells = read_shell_meshes(export) if geometry == "mesh" else None
 
@@ -38,7 +49,11 @@ def camera_photographs(
 
 
 def photographed(
-    export: ExportedDesign, scene: Scene, geometry: Geometry, samples: Samples, progress: Progress
+    export: ExportedDesign,
+    scene: Scene,
+    geometry: Geometry,
+    samples: Samples | RealOptics,
+    progress: Progress,
 ) -> LightField:
     """The light field in memory; arguments and errors as of `camera_photographs`."""
     cameras = camera_photographs(export, scene, geometry, samples, progress)

@@ -21,6 +21,8 @@ FINEST = "G10"  # that shops stock in all sizes it is sold in; finer ones are ma
 MAX_DIAMETER_MM = 1000.0
 MAX_MASS_G = 1e7
 
+RQ_OVER_RA = 1.25  # of normally distributed heights
+
 
 @dataclass(frozen=True)
 class StockBall:
@@ -114,6 +116,18 @@ def load_grades() -> dict[str, Grade]:
         sphericity, diameter, roughness, lot = map(float, deviations)
         grades[grade] = Grade(grade, sphericity, diameter, roughness, lot, standard)
     return grades
+
+
+def roughness_rq_nm(grade: str | None) -> float:
+    """RMS roughness at the limit of a grade, nm; of a cap, which has none, what it is polished to.
+
+    Rq is 1.25 Ra, as of normally distributed heights.
+    """
+    if grade is None:
+        from tbcad.core.optics.reflection import roughness_nm  # numpy: not for help and bad input
+
+        return roughness_nm()
+    return 1000 * RQ_OVER_RA * load_grades()[grade].roughness_ra_um
 
 
 def load_catalogue(names: Iterable[str]) -> Catalogue:

@@ -11,6 +11,16 @@ from scipy.ndimage import convolve1d
 from tbcad.common.compiled import compiled
 from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
 from tbcad.light.simulate.capture.photograph import row_bands
+from tbcad.light.simulate.capture.sensor import (
+    Image16,
+    PixelMaps,
+    Signal,
+    SimulatedSensor,
+    generator,
+    pixel_directions,
+    pixel_maps,
+    recorded,
+)
 from tbcad.light.simulate.prototype.ball_rays import ball_hits, camera_colours
 from tbcad.light.simulate.prototype.run import HALF_TURN, turned_balls
 from tbcad.light.simulate.scene.ray_casting import Scene
@@ -22,16 +32,6 @@ from tbcad.rig.simulated_run.led_light import (
     Occluders,
     balls_of_frame,
     led_light,
-)
-from tbcad.rig.simulated_run.sensor import (
-    Image16,
-    PixelMaps,
-    Signal,
-    SimulatedSensor,
-    generator,
-    pixel_directions,
-    pixel_maps,
-    recorded,
 )
 from tbcad.types import Colours, Floats
 

@@ -14,6 +14,7 @@ from PIL import Image
 
 from tbcad.common.atomic_files import write_errors_as_input_errors
 from tbcad.errors import InputError
+from tbcad.light.simulate.capture.sensor import Image16, SimulatedSensor
 from tbcad.light.simulate.parallel import THREADS
 from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.lamps import lit_by, read_lamps
@@ -52,7 +53,6 @@ from tbcad.rig.simulated_run.photographs import (
     SimulatedRun,
     phases_of,
 )
-from tbcad.rig.simulated_run.sensor import Image16, SimulatedSensor
 from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.prototype.gravity import read_gravity
 from tbcad.types import Progress

@@ -11,8 +11,11 @@ import trimesh
 from PIL import Image
 
 from tbcad.app.cli import run
+from tbcad.core.camera.sheet import write_camera_sheet
+from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.options.shared import numbers
+from tbcad.records.camera_sheet import RealOpticsRecord
 from tbcad.rig.runs import read_run
 from tests.app.cli.commands import Command
 from tests.exported_files import contents
@@ -43,6 +46,51 @@ def test_capture_repeats_and_replaces_with_force_only(
     assert "is a capture already: name another folder" in cli(*capture, code=2).err
     cli(*capture, "--force")
     assert contents(copied) == contents(captured)
+
+
+def test_capture_with_real_optics(
+    record: Path, low_resolution_design: MirrorDesign, tmp_path: Path, cli: Command
+) -> None:
+    """By the lens of camera.json; the record says what is in it."""
+    export, out = tmp_path / "export", tmp_path / "out"
+    shutil.copytree(record, export)
+    real = ["capture", export, "--optics", "real", "--out", out]
+    line = cli(*real, code=2).err
+    assert "camera.json is not there: build it again with tbcad build, or leave out" in line
+    assert not out.exists()
+    write_camera_sheet(export, low_resolution_design.arrays[0], 30.0)
+    cli(*real, "--gloss", "0.3")
+    written = json.loads((out / "capture.json").read_text())
+    assert written["optics"] == "real"
+    lens = RealOpticsRecord.model_validate(written["real"])
+    needed = json.loads((export / "camera.json").read_text())["requirements"]
+    assert (lens.pupil_mm, lens.focus_mm) == (needed["pupil_mm"], needed["focus_mm"])
+    assert (lens.lens, lens.gloss, lens.rays_a_pixel) == (None, 0.3, 4)
+    with LightField.open(out) as source:
+        assert source.facts["real"] == written["real"]
+    assert "PSNR" in cli("view", out, "--out", tmp_path / "view.png", *SMALL).out
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--gloss", "0.3"], "--gloss is of --optics real"),
+        (["--optics", "real", "--mesh"], "--optics real is not for --mesh"),
+        (["--optics", "real", "--samples", "2"], "--optics real is not for --samples"),
+        (["--optics", "real", "--frames", "2"], "--optics real is not for --frames"),
+        (["--optics", "real", "--lights", "mirrors"], "--optics real is not for --lights"),
+        (["--optics", "real", "--gloss", "0.01"], "--gloss"),
+        (["--optics", "real", "--gloss", "nan"], "--gloss"),
+        (["--optics", "good"], "--optics"),
+    ],
+)
+def test_optics_that_do_not_go_together(
+    record: Path, tmp_path: Path, cli: Command, words: list[str], reason: str
+) -> None:
+    line = cli("capture", record, "--out", tmp_path / "out", *words, code=2).err
+    assert reason in line
+    assert line.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_capture_is_named_after_its_object(

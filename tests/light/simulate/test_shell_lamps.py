@@ -11,8 +11,14 @@ from tbcad.core.mirrors.record import write_record
 from tbcad.core.optics.mirror_light import REFLECTED, light_by_mirrors, lit_mirrors
 from tbcad.errors import InputError
 from tbcad.light.simulate.scene import shell_lamps
+from tbcad.light.simulate.scene.object import patterned_ball
+from tbcad.light.simulate.scene.real_scene import real_scene
 from tbcad.light.simulate.scene.reflector import read_export
-from tbcad.light.simulate.scene.shell_lamps import mirror_light_factors, read_shell_lamps
+from tbcad.light.simulate.scene.shell_lamps import (
+    lit_by_mirrors,
+    mirror_light_factors,
+    read_shell_lamps,
+)
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.shell_lamps.files import printed_ring, ring_record
 from tbcad.shell_lamps.ring import lamp_ring
@@ -40,6 +46,16 @@ def test_fitted_light_is_that_of_each_surface(folder: Path) -> None:
     fitted = shell_lamps._terms(export, places, normals) @ factors
     assert np.abs(fitted - total).max() < 0.1 * total.max()
     assert np.sqrt(np.mean((fitted - total) ** 2)) < 0.04 * total.max()
+
+
+def test_a_ball_casts_no_shadow_on_itself(folder: Path) -> None:
+    """So its outside has the light that it has without shadows; behind there is none."""
+    export, lamps, ball = read_export(folder), read_shell_lamps(folder), patterned_ball(15.0)
+    shadowed = real_scene(export, ball, lamps).shade
+    even = lit_by_mirrors(export, lamps, ball).light
+    assert even is not None
+    assert shadowed[:, 0] == pytest.approx(even[:, 0], abs=0.03)
+    assert shadowed[:, 1].max() < 0.01
 
 
 def test_a_build_without_lamps_is_refused(small_design: MirrorDesign, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from tbcad.core.optics.reflection import roughness_nm
 from tbcad.core.spec.errors import SpecError
 from tbcad.prototype.balls.catalogue import (
     COLUMNS,
@@ -10,6 +11,7 @@ from tbcad.prototype.balls.catalogue import (
     StockBall,
     load_catalogue,
     load_grades,
+    roughness_rq_nm,
     steel_mass_g,
 )
 
@@ -108,3 +110,8 @@ def test_a_ball_is_bought_in_the_best_grade_from_g10(
 ) -> None:
     ball = StockBall("10 mm", 10.0, "ISO 3290-1", frozenset(grades.split()), 4.09, "mine")
     assert ball.bought_grade(coarsest) == bought
+
+
+def test_roughness_of_grades_and_of_caps() -> None:
+    assert roughness_rq_nm("G10") == pytest.approx(25.0)
+    assert roughness_rq_nm(None) == pytest.approx(roughness_nm())

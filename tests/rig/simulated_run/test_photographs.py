@@ -12,6 +12,14 @@ from tbcad.core.optics.camera import Camera, LensCamera, without_distortion
 from tbcad.core.optics.led_dome import dome_images
 from tbcad.core.optics.pedestals.cells import NO_WALLS
 from tbcad.core.optics.sphere_forms import TERM_COUNT, Forms
+from tbcad.light.simulate.capture.sensor import (
+    PixelMaps,
+    SimulatedSensor,
+    generator,
+    pixel_directions,
+    pixel_maps,
+    recorded,
+)
 from tbcad.light.simulate.prototype.ball_rays import balls_between
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
@@ -25,14 +33,6 @@ from tbcad.rig.simulated_run.photographs import (
     add_points,
     blurred,
     phases_of,
-)
-from tbcad.rig.simulated_run.sensor import (
-    PixelMaps,
-    SimulatedSensor,
-    generator,
-    pixel_directions,
-    pixel_maps,
-    recorded,
 )
 from tests.simulated_runs import BRIGHT, Small, small_run
 

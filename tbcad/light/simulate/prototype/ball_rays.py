@@ -3,7 +3,9 @@
 Along given directions, in the whole photograph of a stop, or in the pixels that are interpolated.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -108,14 +110,21 @@ def image_points(camera: LensCamera, direction: Floats) -> Floats:
 def resampled_photograph(
     run: PrototypeRun, scene: Scene, stop: int, samples: Samples, places: Floats
 ) -> Bytes:
-    """The photograph of a stop at columns and rows (n, 2) between its pixels' centres, (n, 3).
+    """The photograph of a stop at columns and rows (n, 2) between its pixels' centres, (n, 3)."""
+    taken = partial(photographed_pixels, run, scene, stop, samples)
+    return resampled(run.camera.width_px, places, taken)
 
-    Bilinear between the four nearest pixels, which are whole numbers as in a file.
+
+def resampled(width_px: int, places: Floats, taken: Callable[[Ints], Bytes]) -> Bytes:
+    """A photograph at columns and rows (n, 2) between its pixels' centres, (n, 3).
+
+    Bilinear between the four nearest pixels, which are whole numbers as in a file. `taken`: their
+    colours (k, 3), of numbers (k,), counted row by row, ascending.
     """
     near, weight = between_pixels(places)
-    pixel = near[..., 0] + near[..., 1] * run.camera.width_px
+    pixel = near[..., 0] + near[..., 1] * width_px
     traced, which = np.unique(pixel, return_inverse=True)
-    corners = photographed_pixels(run, scene, stop, samples, traced)[which.reshape(len(places), 4)]
+    corners = taken(traced)[which.reshape(len(places), 4)]
     return to_bytes(np.einsum("nk,nkc->nc", weight, corners))
 
 

@@ -17,14 +17,17 @@ from numpy.typing import NDArray
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.optics.camera import without_distortion
 from tbcad.light.simulate.capture.photograph import CENTRE, RowBand, Samples, Tracer, row_bands
+from tbcad.light.simulate.capture.real import RealOptics
 from tbcad.light.simulate.parallel import in_batches, in_threads
 from tbcad.light.simulate.prototype.ball_rays import (
     BallHits,
     image_points,
+    resampled,
     resampled_photograph,
     trace_balls,
     trace_own_ball,
 )
+from tbcad.light.simulate.prototype.real_balls import real_pixels
 from tbcad.light.simulate.prototype.run import PrototypeRun
 from tbcad.light.simulate.scene.ray_casting import Scene, object_in_front
 from tbcad.light.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
@@ -203,11 +206,15 @@ class SimulatedPhotographs:
 
     run: PrototypeRun  # the run
     scene: Scene  # the object
-    samples: Samples = 1  # a pixel is the mean of these rays
+    # a pixel is the mean of these rays, or what a real camera makes of it
+    samples: Samples | RealOptics = 1
 
     def colours(self, stop: int, places: Floats) -> Bytes:
         """Colours (n, 3) of a stop's photograph at columns and rows (n, 2)."""
-        return resampled_photograph(self.run, self.scene, stop, self.samples, places)
+        if not isinstance(self.samples, RealOptics):
+            return resampled_photograph(self.run, self.scene, stop, self.samples, places)
+        taken = partial(real_pixels, self.run, self.scene, stop, self.samples)
+        return resampled(self.run.camera.width_px, places, taken)
 
     def in_front(self, mirror: Ints, direction: Floats, distance: Floats) -> Bools:
         """Where (n,) the object is before what camera rays meet at distances (n,), mm."""
@@ -216,9 +223,12 @@ class SimulatedPhotographs:
 
 
 def merge_run(
-    run: PrototypeRun, scene: Scene, samples: Samples = 1, progress: Progress = lambda _: None
+    run: PrototypeRun,
+    scene: Scene,
+    samples: Samples | RealOptics = 1,
+    progress: Progress = lambda _: None,
 ) -> Iterator[RowBand]:
-    """Bands of the merged picture; pixels of photographs are means of `samples`."""
+    """Bands of the merged picture; pixels of photographs are means of `samples`, or real."""
     photographs = SimulatedPhotographs(run, scene, samples)
     plan = merge_plan(run, scene.radius, photographs.in_front)
     yield from merge_photographs(plan, photographs, progress)

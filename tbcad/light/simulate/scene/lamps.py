@@ -4,6 +4,8 @@ The rectangular lamps of a prototype are fixed to the object: they stand so that
 leaves the light as it was. They cast no shadows, as the built-in light.
 """
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -126,16 +128,26 @@ def irradiance(lamps: RectangularLamps, points: Floats, normals: Floats) -> Floa
 
     A tile that gives F lumen in all, Lambertian, gives F / pi cos cos' / r^2 at a distance r.
     """
-    total = np.zeros(len(points))
-    middles, facing = lamps.tiles()
-    flux = lamps.lumen * len(lamps.places) / len(middles)
-    for middle, way in zip(middles, facing, strict=True):
+    tiles = zip(*lamps.tiles(), strict=True)
+    light = (tile_irradiance(lamps, middle, way)(points, normals) for middle, way in tiles)
+    return np.asarray(sum(light, np.zeros(len(points))))
+
+
+def tile_irradiance(
+    lamps: RectangularLamps, middle: Floats, way: Floats
+) -> Callable[[Floats, Floats], Floats]:
+    """The irradiance by one tile, in its middle (3,) and facing a direction (3,)."""
+    count = len(lamps.places)
+    flux = lamps.lumen * count / (count * math.prod(TILES))
+
+    def light(points: Floats, normals: Floats) -> Floats:
         toward = middle - points
         distance = norm(toward)
         leaves = np.maximum(-(toward @ way), 0) / distance
         meets = np.maximum((toward * normals).sum(axis=1), 0) / distance
-        total += 1e6 * flux / np.pi * leaves * meets / distance**2
-    return total
+        return np.asarray(1e6 * flux / np.pi * leaves * meets / distance**2)
+
+    return light
 
 
 def lit_by(lamps: RectangularLamps, subject: SceneObject) -> SceneObject:

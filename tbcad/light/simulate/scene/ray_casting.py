@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tbcad.core.geometry.vectors import dot, facet_vectors, unit
 from tbcad.core.optics.reflection import reflect
 from tbcad.light.simulate.parallel import over_chunks
+from tbcad.light.simulate.scene.cast_light import Gloss
 from tbcad.light.simulate.scene.lamps import PointLights, Spots, lamp_light
 from tbcad.light.simulate.scene.object import SceneObject, pattern
 from tbcad.light.simulate.scene.rays import meets_sphere
@@ -38,6 +39,8 @@ class Scene:
     gloss: float = 0.0
     # in place of all that light, with cast shadows; None: as `shade` says
     lamps: PointLights | None = None
+    # highlights of lamps in the object's microfacets, besides; None: it is matt
+    microfacets: Gloss | None = None
 
 
 @dataclass(frozen=True)
@@ -83,8 +86,12 @@ def both_sides(light: Callable[[Floats], Floats], normals: Floats) -> Floats:
 def built_in_shade(normals: Floats) -> Floats:
     """The built-in light on surfaces with unit normals (v, 3), 0 to 1, (v,)."""
     lit = np.maximum(normals @ LAMPS.T, 0) @ LAMP_LIGHT
-    sky = SKY_LIGHT * (0.75 + 0.25 * normals[:, 2])
-    return np.asarray(np.minimum(lit + sky, 1.0))
+    return np.asarray(np.minimum(lit + sky_light(normals), 1.0))
+
+
+def sky_light(normals: Floats) -> Floats:
+    """The part of it that has no lamp, (v,)."""
+    return np.asarray(SKY_LIGHT * (0.75 + 0.25 * normals[:, 2]))
 
 
 @dataclass(frozen=True)
@@ -132,6 +139,13 @@ class SurfaceHits:
         met: Floats = np.where(behind, corners[..., 1], corners[..., 0])
         return np.asarray((met * self.weight).sum(axis=1))
 
+    def highlights(self, subject: SceneObject, gloss: Gloss) -> Floats:
+        """Light (k,) of lamps in microfacets that goes back along the rays."""
+        spots = self.spots(subject)
+        behind = self.behind(subject, spots.facet_normal)
+        at = spots.place, spots.normal, self.direction
+        return gloss.highlights(subject.faces[self.facet], behind, self.weight, at)
+
 
 def surface_hits(scene: Scene, origin: Floats, direction: Floats) -> SurfaceHits:
     """Where rays from origins (n, 3) along unit directions (n, 3) meet the object."""
@@ -160,6 +174,8 @@ def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
         mirrored = reflect(hits.direction, hits.normals(scene.subject))
         glint = scene.gloss * (np.maximum(mirrored @ LAMPS.T, 0) ** GLOSS_EXPONENT @ LAMP_LIGHT)
         colour[hits.rows] = np.minimum(colour[hits.rows] + 255 * glint[:, None], 255)
+    if scene.microfacets is not None:
+        colour[hits.rows] += 255 * hits.highlights(scene.subject, scene.microfacets)[:, None]
     return RayHits(colour, depth)
 
 

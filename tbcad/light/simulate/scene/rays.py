@@ -104,33 +104,56 @@ def _toward(columns: Floats, lines: Floats, depth: float, aside: Floats) -> Floa
     return result
 
 
-def exact_tracer(reflector: Reflector) -> Callable[[range, Shift], TracedRays]:
+@dataclass(frozen=True)
+class PupilPoint:
+    """A point of a lens's pupil that rays go through, from what is in focus."""
+
+    aside: Floats  # the point less the pinhole, mm, (3,)
+    focus: float  # depth that is in focus, along `forward`, mm
+    margin_px: int = 1  # by which what is out of focus may be beside its place from the pinhole
+
+    def directions(self, view: Camera, rows: range, shift: Shift) -> Floats:
+        """Unit vectors (h, w, 3) from the point toward what pixels see in focus."""
+        return unit_directions(view, rows, shift, self.focus, self.aside)
+
+
+def exact_tracer(
+    reflector: Reflector, through: PupilPoint | None = None
+) -> Callable[[range, Shift], TracedRays]:
     """A function that traces rows of a camera's pixels off its exact mirrors (`part_tracer`)."""
-    trace, columns = part_tracer(reflector), range(reflector.camera.width_px)
+    trace, columns = part_tracer(reflector, through), range(reflector.camera.width_px)
     return lambda rows, shift: trace(rows, columns, shift)
 
 
-def part_tracer(reflector: Reflector) -> Callable[[range, range, Shift], TracedRays]:
+def part_tracer(
+    reflector: Reflector, through: PupilPoint | None = None
+) -> Callable[[range, range, Shift], TracedRays]:
     """A function that traces some rows and columns of a camera's pixels off its exact mirrors.
 
     The mirror that a ray meets first is the one whose surface it enters first, since a cell is
     what no other sphere covers (DESIGN.md section 2). What lies beyond seam or foot is no mirror,
     nor what lies beyond a wall of the mirror's own pedestal: there the ray ends in a groove.
+    Rays go through the pinhole, or another point of the pupil.
     """
     boxes, neighbours = reflector.boxes(), reflector.neighbours_at_edge()
     camera, edges = reflector.camera, (reflector.side, reflector.foot)
-    table = _table(reflector.mirrors, camera.pinhole)
+    start = camera.pinhole
+    if through is not None:
+        start = camera.pinhole + through.aside
+        boxes = boxes + through.margin_px * np.array([-1, 1, -1, 1])
+    table = _table(reflector.mirrors, start)
     walls = reflector.walls.of_mirrors(len(reflector))
 
     def trace(rows: range, columns: range, shift: Shift) -> TracedRays:
-        direction = pixel_directions(camera, rows, shift)[:, columns.start : columns.stop]
+        every = through.directions if through else pixel_directions
+        direction = every(camera, rows, shift)[:, columns.start : columns.stop]
         in_part = boxes - np.repeat([columns.start, rows.start], 2)
         in_part[:, :2] = np.clip(in_part[:, :2], 0, len(columns))
         near = np.flatnonzero(
             (in_part[:, 2] < len(rows)) & (in_part[:, 3] > 0) & (in_part[:, 0] < in_part[:, 1])
         )
-        mirror = _first_mirror(camera.pinhole, direction, table, near, in_part, walls, edges)
-        rays = reflect_pixels(camera.pinhole, direction, reflector.mirrors, mirror)
+        mirror = _first_mirror(start, direction, table, near, in_part, walls, edges)
+        rays = reflect_pixels(start, direction, reflector.mirrors, mirror)
         return rays.without(_inside_neighbours(table, neighbours, mirror, rays.origin))
 
     return trace

@@ -19,6 +19,7 @@ from tbcad.core.optics.mirror_light import (
     lit_mirrors,
 )
 from tbcad.errors import InputError
+from tbcad.light.simulate.scene.cast_light import Lit
 from tbcad.light.simulate.scene.lamps import exposed
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import both_sides
@@ -46,13 +47,19 @@ def read_shell_lamps(folder: Path) -> Lamps:
 
 def lit_by_mirrors(export: ExportedDesign, lamps: Lamps, subject: SceneObject) -> SceneObject:
     """An object with the light of lamps at its corners, as bright as a good exposure shows it."""
-    factors = mirror_light_factors(export, lamps)
+    by_mirrors = mirror_light(export, lamps)
 
     def light(normals: Floats) -> Floats:
-        by_mirrors = np.maximum(_terms(export, subject.points, normals) @ factors, 0.0)
-        return np.asarray(by_mirrors + direct_light(lamps, subject.points, normals))
+        direct = direct_light(lamps, subject.points, normals)
+        return np.asarray(by_mirrors(subject.points, normals) + direct)
 
     return replace(subject, light=exposed(both_sides(light, subject.normals)))
+
+
+def mirror_light(export: ExportedDesign, lamps: Lamps) -> Lit:
+    """Light of lamps by mirrors on surfaces in the capture sphere, lux."""
+    factors = mirror_light_factors(export, lamps)
+    return lambda places, normals: np.maximum(_terms(export, places, normals) @ factors, 0.0)
 
 
 def mirror_light_factors(export: ExportedDesign, lamps: Lamps) -> Floats:

@@ -8,14 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.ndimage import minimum_filter
 from scipy.spatial.transform import Rotation
 
 import tbcad.light.simulate.parallel
 from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.optics.lens import PupilLens
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
 from tbcad.light.simulate.capture.photograph import CENTRE, RowBand
 from tbcad.light.simulate.capture.photograph import photograph as shell_photograph
+from tbcad.light.simulate.capture.real import RealOptics
 from tbcad.light.simulate.prototype.ball_rays import (
     resampled_photograph,
     trace_balls,
@@ -53,6 +56,24 @@ def runs(layout: PrototypeLayout, cameras: tuple[Reflector, Reflector]) -> Runs:
 @pytest.fixture(scope="module")
 def merged(runs: Runs, knot: Scene) -> LightField:
     return merged_light_field(runs, knot)
+
+
+def test_merged_of_real_photographs(runs: Runs, merged: LightField, knot: Scene) -> None:
+    """The same mirrors and nearly the same light: blurred, with noise; without balls brighter."""
+    count = runs[0].balls.shape[1]
+    optics = RealOptics(PupilLens(0.85, 134.6), 0.55, np.full(count, 25.0))
+    bands = list(merge_run(runs[0], knot, optics))
+    mirror = np.concatenate([band.rays.mirror for band in bands])
+    colour = np.concatenate([band.colour for band in bands]).astype(float)
+    ideal = merged.frames["a"]
+    assert (mirror == ideal.planes["mirror"]).all()
+    sharp, on = ideal.planes["colour"].astype(float), mirror > 0
+    assert np.corrcoef(sharp[on].ravel(), colour[on].ravel())[0, 1] > 0.9
+    assert colour[on].mean() == pytest.approx(sharp[on].mean(), rel=0.1)
+    direct = minimum_filter((sharp.max(axis=2) > 60) & ~on, 7)
+    assert colour[direct].mean() == pytest.approx(
+        np.minimum(sharp[direct] / 0.55, 255).mean(), rel=0.05
+    )
 
 
 def merged_light_field(runs: Runs, scene: Scene) -> LightField:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from tbcad.core.optics.camera import LensCamera, vignetting
-from tbcad.types import Floats, Ints
+from tbcad.types import Bools, Floats, Ints
 
 Signal = NDArray[np.float32]
 Image16 = NDArray[np.uint8] | NDArray[np.uint16]
@@ -114,8 +114,11 @@ def recorded(
     image = _empty(sensor, (maps.transmission.size, colours), random)
     pixels = None if light is None else light.reshape(maps.transmission.size, -1)
     faint = EMPTY / sensor.full_electrons
-    lit = np.flatnonzero([] if pixels is None else pixels.max(axis=1) > faint)
-    bright = np.union1d(lit, maps.hot)
+    shining: Bools = np.zeros(maps.transmission.size, dtype=bool)
+    if pixels is not None:
+        shining[:] = (pixels > faint).any(axis=1)
+    shining[maps.hot] = True
+    bright = np.flatnonzero(shining)
     electrons = np.full((len(bright), colours), sensor.dark_electrons)
     electrons[np.searchsorted(bright, maps.hot)] += seconds * maps.hot_electrons[:, None]
     if pixels is not None:
