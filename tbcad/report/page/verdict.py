@@ -183,7 +183,7 @@ def _yields(yields: Sequence[ProcessYield]) -> str:
         f"<td class=n>{one.coverage_mm:.2f} mm</tr>"
         for one in yields
     )
-    head = "<table class=made><thead><tr><th>Process<th>Yield<th><th>Coverage</tr></thead><tbody>"
+    head = "<table class=made><thead><tr><th>Process<th colspan=2>Yield<th>Coverage</tr></thead><tbody>"
     return f"{head}{''.join(rows)}</tbody></table>"
 
 
@@ -200,15 +200,14 @@ def checks_html(verdict: Verdict | None) -> Iterator[str]:
     passed = sum(check.passed is True for check in every)
     yield f"<p>{passed} of {len(every)} checks passed.</p>"
     yield f"<details><summary>All {len(every)} checks, by name</summary>"
-    yield "<div class=wide>"
     yield from _check_table(sorted(every, key=lambda check: place[check.name]))
-    yield "</div></details>"
+    yield "</details>"
 
 
 def _check_table(checks: Iterable[CheckRow]) -> Iterator[str]:
     yield (
-        "<table class=checks><thead><tr><th>Result<th>Check<th>File<th>Measured<th>Limit<th>Unit"
-        "<th>Detail</tr></thead><tbody>"
+        "<div class=wide><table class=checks><thead><tr><th>Result<th>Check<th>File<th>Measured"
+        "<th>Limit<th>Unit<th>Detail</tr></thead><tbody>"
     )
     for check in checks:
         state, sign, text = STATES[check.passed]
@@ -218,7 +217,7 @@ def _check_table(checks: Iterable[CheckRow]) -> Iterator[str]:
             f"<td class=n>{_figure(check.limit)}<td>{_unit(check.unit)}<td>{escape(check.detail)}"
             "</tr>"
         )
-    yield "</tbody></table>"
+    yield "</tbody></table></div>"
 
 
 def _unit(text: str) -> str:

@@ -362,10 +362,23 @@ function startPrinting() {
   id("print").addEventListener("click", () => print());
 }
 
+// Cells know their column, which narrow screens show in front of them; keys scroll wide tables.
+function labelTables() {
+  for (const table of document.querySelectorAll(".wide table")) {
+    const heads = [...table.tHead.rows[0].cells].map((cell) => cell.firstChild.textContent);
+    for (const row of table.tBodies[0].rows) {
+      [...row.cells].forEach((cell, k) => { cell.dataset.head = heads[k]; });
+    }
+    const title = table.closest("section").querySelector("h2").textContent;
+    Object.assign(table.parentElement, { tabIndex: 0, role: "region", ariaLabel: title });
+  }
+}
+
 async function start() {
   setTheme(matchMedia("(prefers-color-scheme: dark)").matches);
   id("theme").addEventListener("click", () => setTheme(document.documentElement.dataset.theme !== "dark"));
   startPrinting();
+  labelTables();
   const data = JSON.parse(id("data").textContent);
   window.report = new Page(data, await unpack(data.arrays));
   document.documentElement.dataset.ready = "true";
