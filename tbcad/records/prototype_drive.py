@@ -121,6 +121,42 @@ class LampPlace(RecordSection):
     direction: Vector
 
 
+class UpperLed(RecordSection):
+    """An LED above the object: its shining face's middle, and the tube that carries it.
+
+    Attributes:
+        names: of its board, its head and its tube.
+        direction: that it shines in, a unit vector.
+        head_mm: the ends of the cylinder round board and head.
+        tube_mm: the ends of the tube.
+    """
+
+    names: tuple[str, str, str]
+    position_mm: Vector
+    direction: Vector
+    head_mm: tuple[Vector, Vector]
+    tube_mm: tuple[Vector, Vector]
+
+
+class UpperLampsRecord(RecordSection):
+    """What lights surfaces that face up, and what it hides.
+
+    Attributes:
+        part: the LED, in the list of parts.
+        candela_each: along the direction of each, in its current.
+        tolerance_mm: by which heads and tubes may be beside their places; a merge leaves out all
+            rays that come so near to them.
+    """
+
+    part: str
+    leds: tuple[UpperLed, ...] = Field(min_length=1, max_length=100)
+    candela_each: float = Field(gt=0, le=1e6)
+    current_ma: float = Field(gt=0, le=1e6)
+    head_diameter_mm: float = Field(gt=0, le=1000)
+    tube_diameter_mm: float = Field(gt=0, le=1000)
+    tolerance_mm: float = Field(ge=0, le=1000)
+
+
 class LampsRecord(RecordSection):
     """What lights the object.
 
@@ -141,6 +177,7 @@ class LampsRecord(RecordSection):
     lumen_each: float = Field(gt=0, le=1e6)
     watt: Finite
     current_ma: Finite
+    upper: UpperLampsRecord | None = None
 
 
 class CardPanel(RecordSection):

@@ -13,7 +13,8 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.electronics import e24_at_least, led_circuit, series_resistor, wiring_layout
+from tbcad.prototype.electronics import led_circuit, wiring_layout
+from tbcad.prototype.resistors import e24_at_least, series_resistor
 from tbcad.prototype.files.bom import ALWAYS, PrintedItem, bom_rows, totals
 from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.purchased.parts import Prices, load_parts, load_prices, of_kind

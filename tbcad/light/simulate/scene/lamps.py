@@ -4,14 +4,14 @@ The rectangular lamps of a prototype are fixed to the object: they stand so that
 leaves the light as it was. They cast no shadows, as the built-in light.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.core.geometry.vectors import dot, norm
+from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.types import Bools, Floats
@@ -94,6 +94,9 @@ class RectangularLamps:
     width: float  # of a face, across, mm
     length: float  # of a face, upward, mm
     lumen: float  # light of each
+    # places of the LEDs above, mm, (k, 3), which face the origin, and the candela of each
+    leds: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    candela: float = 0.0
 
     def tiles(self) -> tuple[Floats, Floats]:
         """Middles (t, 3) of the tiles of all faces, and the directions that they face, (t, 3)."""
@@ -116,8 +119,14 @@ def read_lamps(folder: Path) -> RectangularLamps | None:
     places = np.array([place.position_mm for place in found.places])
     inward = np.array([place.direction for place in found.places])
     sides = found.width_mm, found.length_mm
+    upper = found.upper
     return RectangularLamps(
-        places, inward, *(sides[::-1] if found.level else sides), found.lumen_each
+        places,
+        inward,
+        *(sides[::-1] if found.level else sides),
+        found.lumen_each,
+        np.array([led.position_mm for led in upper.leds] if upper else []).reshape(-1, 3),
+        upper.candela_each if upper else 0.0,
     )
 
 
@@ -126,15 +135,26 @@ def irradiance(lamps: RectangularLamps, points: Floats, normals: Floats) -> Floa
 
     A tile that gives F lumen in all, Lambertian, gives F / pi cos cos' / r^2 at a distance r.
     """
-    total = np.zeros(len(points))
     middles, facing = lamps.tiles()
     flux = lamps.lumen * len(lamps.places) / len(middles)
-    for middle, way in zip(middles, facing, strict=True):
-        toward = middle - points
+    total = lambertian(middles, facing, flux / np.pi, points, normals)
+    return total + lambertian(lamps.leds, -unit(lamps.leds), lamps.candela, points, normals)
+
+
+def lambertian(
+    places: Floats, facing: Floats, candela: float, points: Floats, normals: Floats
+) -> Floats:
+    """Irradiance (n,) by small Lambertian faces at places (l, 3) with normals (l, 3), lux.
+
+    Of surfaces at points (n, 3) with unit normals (n, 3); candela: of each face along its normal.
+    """
+    total = np.zeros(len(points))
+    for place, way in zip(places, facing, strict=True):
+        toward = place - points
         distance = norm(toward)
         leaves = np.maximum(-(toward @ way), 0) / distance
         meets = np.maximum((toward * normals).sum(axis=1), 0) / distance
-        total += 1e6 * flux / np.pi * leaves * meets / distance**2
+        total += 1e6 * candela * leaves * meets / distance**2
     return total
 
 
