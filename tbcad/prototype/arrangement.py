@@ -86,7 +86,10 @@ class PrototypeModel(Site):
     def rig_light(self) -> RigLight:
         """What there is for its camera."""
         lamps, mount = self.frame.find(LampLayout), self.frame.find(CameraMount)
-        upper, named = self.frame.find(UpperLamps), mount.chosen.name if mount and mount.chosen else None
+        upper, named = (
+            self.frame.find(UpperLamps),
+            mount.chosen.name if mount and mount.chosen else None,
+        )
         more = upper.lux if upper else 0.0
         return RigLight(lamps.lux + more if lamps else None, named)
 
@@ -303,7 +306,7 @@ def _open_keys(spec: Spec) -> dict[str, object]:
 
 
 # Light goes into the first two; the stage's own limits hold for its post.
-MAY_BE_LIT = ("camera", "camera_lens", "stage_post", "upper_head_*", "upper_board_*", "upper_tube_*")
+MAY_BE_LIT = ("camera", "camera_lens", "stage_post", "upper_board_*", "upper_rod_*")
 REMEDY = "prototype.frame.uprights_mm or prototype.largest_ball_mm smaller"
 
 

@@ -122,20 +122,20 @@ class LampPlace(RecordSection):
 
 
 class UpperLed(RecordSection):
-    """An LED above the object: its shining face's middle, and the tube that carries it.
+    """An LED above the object: its shining face's middle, and the rod that carries it.
 
     Attributes:
-        names: of its board, its head and its tube.
+        names: of its board and its rod.
         direction: that it shines in, a unit vector.
-        head_mm: the ends of the cylinder round board and head.
-        tube_mm: the ends of the tube.
+        head_mm: the ends of the cylinder round LED, board and what is glued on it.
+        rod_mm: start on the board's back, elbow, and lower end.
     """
 
-    names: tuple[str, str, str]
+    names: tuple[str, str]
     position_mm: Vector
     direction: Vector
     head_mm: tuple[Vector, Vector]
-    tube_mm: tuple[Vector, Vector]
+    rod_mm: tuple[Vector, Vector, Vector]
 
 
 class UpperLampsRecord(RecordSection):
@@ -144,7 +144,7 @@ class UpperLampsRecord(RecordSection):
     Attributes:
         part: the LED, in the list of parts.
         candela_each: along the direction of each, in its current.
-        tolerance_mm: by which heads and tubes may be beside their places; a merge leaves out all
+        tolerance_mm: by which boards and rods may be beside their places; a merge leaves out all
             rays that come so near to them.
     """
 
@@ -153,7 +153,7 @@ class UpperLampsRecord(RecordSection):
     candela_each: float = Field(gt=0, le=1e6)
     current_ma: float = Field(gt=0, le=1e6)
     head_diameter_mm: float = Field(gt=0, le=1000)
-    tube_diameter_mm: float = Field(gt=0, le=1000)
+    rod_diameter_mm: float = Field(gt=0, le=1000)
     tolerance_mm: float = Field(ge=0, le=1000)
 
 

@@ -29,7 +29,7 @@ from tbcad.prototype.frame.stock import Stock
 from tbcad.prototype.homing import HomingLayout
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout
-from tbcad.prototype.light.upper import TOLERANCE_MM, UpperLamps
+from tbcad.prototype.light.upper import TOLERANCE_MM, WIRES_MM, UpperLamps
 from tbcad.prototype.printed import PrintedPart
 from tbcad.prototype.stage.layout import led_poses
 from tbcad.prototype.stage.leds import calibration_estimate
@@ -42,9 +42,9 @@ from tbcad.records.prototype_drive import (
     Home,
     LampPlace,
     LampsRecord,
+    ShroudRecord,
     UpperLampsRecord,
     UpperLed,
-    ShroudRecord,
 )
 
 STEP, GLB, BALLS_FILE = "prototype.step", "prototype.glb", "balls.csv"
@@ -257,23 +257,23 @@ def _lamps(lamps: LampLayout | None, upper: UpperLamps | None) -> LampsRecord | 
 
 
 def _upper(upper: UpperLamps) -> UpperLampsRecord:
-    leds = zip(upper.places, upper.heads, upper.tubes, strict=True)
+    leds = zip(upper.places, upper.heads, upper.rods, strict=True)
     return UpperLampsRecord(
         part=upper.led.name,
         leds=tuple(
             UpperLed(
-                names=(f"upper_board_{k}", f"upper_head_{k}", f"upper_tube_{k}"),
+                names=(f"upper_board_{k}", f"upper_rod_{k}"),
                 position_mm=(place + 0.0).tolist(),
                 direction=(-unit(place) + 0.0).tolist(),
                 head_mm=(head + 0.0).tolist(),
-                tube_mm=(tube + 0.0).tolist(),
+                rod_mm=(rod + 0.0).tolist(),
             )
-            for k, (place, head, tube) in enumerate(leds, 1)
+            for k, (place, head, rod) in enumerate(leds, 1)
         ),
         candela_each=upper.candela,
         current_ma=upper.circuit.current_ma,
         head_diameter_mm=upper.led["diameter_mm"],
-        tube_diameter_mm=upper.tube["outer_mm"],
+        rod_diameter_mm=upper.rod["outer_mm"] + WIRES_MM,
         tolerance_mm=TOLERANCE_MM,
     )
 

@@ -1,9 +1,10 @@
-"""What the LEDs above a prototype's object hide: their heads and tubes, as rays meet them.
+"""What the LEDs above a prototype's object hide: their boards and rods, as rays meet them.
 
 They are each other's images by the half turn about z, so both runs have them in the same places in
 the frame of the object.
 """
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from tbcad.types import Bools, Floats
 
 
 def upper_facets(folder: Path, wider: bool = False) -> Floats:
-    """Facets (f, 3, 3) round heads and tubes of an export, mm; without any, or prototype: none.
+    """Facets (f, 3, 3) round boards and rods of an export, mm; without any, or prototype: none.
 
     wider: by the tolerance of their places, to all sides.
 
@@ -30,10 +31,9 @@ def upper_facets(folder: Path, wider: bool = False) -> Floats:
     more = upper.tolerance_mm if wider else 0.0
     facets = []
     for led in upper.leds:
-        for ends, diameter in (
-            (led.head_mm, upper.head_diameter_mm),
-            (led.tube_mm, upper.tube_diameter_mm),
-        ):
+        bodies = [(led.head_mm, upper.head_diameter_mm)]
+        bodies += [(ends, upper.rod_diameter_mm) for ends in pairwise(led.rod_mm)]
+        for ends, diameter in bodies:
             start, end = (np.array(one) for one in ends)
             longer = more * unit(end - start)
             body = cylinder_between(start - longer, end + longer, diameter / 2 + more)
