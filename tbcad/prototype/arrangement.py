@@ -86,10 +86,8 @@ class PrototypeModel(Site):
     def rig_light(self) -> RigLight:
         """What there is for its camera."""
         lamps, mount = self.frame.find(LampLayout), self.frame.find(CameraMount)
-        upper, named = (
-            self.frame.find(UpperLamps),
-            mount.chosen.name if mount and mount.chosen else None,
-        )
+        named = mount.chosen.name if mount and mount.chosen else None
+        upper = self.frame.find(UpperLamps)
         more = upper.lux if upper else 0.0
         return RigLight(lamps.lux + more if lamps else None, named)
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from tbcad.core.geometry.primitives import Component, Primitive, box, cylinder_between
 from tbcad.core.geometry.vectors import norm, unit
+from tbcad.core.optics.lamp_light import RectangularLamps, irradiance, lambertian
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.section import AUTO
-from tbcad.light.simulate.scene.lamps import RectangularLamps, irradiance, lambertian
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, told_words
 from tbcad.prototype.base.fasteners import m3_insert
 from tbcad.prototype.fasteners import Fastener
@@ -279,7 +279,7 @@ def _bar(site: Site, pair: _Pair) -> Component:
     bore = np.array([0.0, 0.0, low - THROUGH_MM]), np.array([0.0, 0.0, high + THROUGH_MM])
     insert = site.base.spec.insert_hole_mm / 2
     cuts: list[Primitive] = [
-        cylinder_between(*bore, post + BORE_PLAY_MM),
+        cylinder_between(bore[0], bore[1], post + BORE_PLAY_MM),
         cylinder_between(middle, middle + (collar + THROUGH_MM) * ACROSS, insert),
     ]
     for _, elbow, end in pair.rods():

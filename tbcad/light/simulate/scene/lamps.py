@@ -4,23 +4,22 @@ The rectangular lamps of a prototype are fixed to the object: they stand so that
 leaves the light as it was. They cast no shadows, as the built-in light.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.geometry.vectors import dot, norm
+from tbcad.core.optics.lamp_light import RectangularLamps, irradiance
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.types import Bools, Floats
 
 # Rays toward a lamp begin so far above the facet that they do not meet it again by rounding, mm.
 ABOVE_FACET_MM = 1e-3
-TILES = (2, 5)  # across and along a lamp's face
 EXPOSED = 99.0  # percentile of the light on the object that a photograph shows as white
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -85,29 +84,6 @@ def lamp_light(embree: Any, spots: Spots, lights: PointLights) -> Floats:
     return total
 
 
-@dataclass(frozen=True)
-class RectangularLamps:
-    """Equal rectangular lamps, upright or level, with Lambertian faces."""
-
-    places: Floats  # middles of the faces, mm, (l, 3)
-    inward: Floats  # unit directions that they face, level, (l, 3)
-    width: float  # of a face, across, mm
-    length: float  # of a face, upward, mm
-    lumen: float  # light of each
-    # places of the LEDs above, mm, (k, 3), which face the origin, and the candela of each
-    leds: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    candela: float = 0.0
-
-    def tiles(self) -> tuple[Floats, Floats]:
-        """Middles (t, 3) of the tiles of all faces, and the directions that they face, (t, 3)."""
-        sides = zip(TILES, (self.width, self.length), strict=True)
-        across, along = (((np.arange(n) + 0.5) / n - 0.5) * size for n, size in sides)
-        x, z = (values.ravel() for values in np.meshgrid(across, along, indexing="ij"))
-        side = np.cross(UP, self.inward)
-        middles = self.places[:, None] + x[:, None] * side[:, None] + z[:, None] * UP
-        return middles.reshape(-1, 3), np.repeat(self.inward, len(x), axis=0)
-
-
 def read_lamps(folder: Path) -> RectangularLamps | None:
     """The lamps of an export's prototype; None where it has none.
 
@@ -128,34 +104,6 @@ def read_lamps(folder: Path) -> RectangularLamps | None:
         np.array([led.position_mm for led in upper.leds] if upper else []).reshape(-1, 3),
         upper.candela_each if upper else 0.0,
     )
-
-
-def irradiance(lamps: RectangularLamps, points: Floats, normals: Floats) -> Floats:
-    """Irradiance (n,) of surfaces at points (n, 3) with unit normals (n, 3), lux.
-
-    A tile that gives F lumen in all, Lambertian, gives F / pi cos cos' / r^2 at a distance r.
-    """
-    middles, facing = lamps.tiles()
-    flux = lamps.lumen * len(lamps.places) / len(middles)
-    total = lambertian(middles, facing, flux / np.pi, points, normals)
-    return total + lambertian(lamps.leds, -unit(lamps.leds), lamps.candela, points, normals)
-
-
-def lambertian(
-    places: Floats, facing: Floats, candela: float, points: Floats, normals: Floats
-) -> Floats:
-    """Irradiance (n,) by small Lambertian faces at places (l, 3) with normals (l, 3), lux.
-
-    Of surfaces at points (n, 3) with unit normals (n, 3); candela: of each face along its normal.
-    """
-    total = np.zeros(len(points))
-    for place, way in zip(places, facing, strict=True):
-        toward = place - points
-        distance = norm(toward)
-        leaves = np.maximum(-(toward @ way), 0) / distance
-        meets = np.maximum((toward * normals).sum(axis=1), 0) / distance
-        total += 1e6 * candela * leaves * meets / distance**2
-    return total
 
 
 def lit_by(lamps: RectangularLamps, subject: SceneObject) -> SceneObject:

@@ -201,14 +201,15 @@ def irradiance(
             free = ~bodies.blocked(np.broadcast_to(tile, places.shape), places, angle)
             flux = 1e6 * exitance * area / np.pi * leaves / distance**2 * free
             total += flux[index] * np.maximum((normals * way[index]).sum(axis=1), 0)
-    for led in lamps.upper.leds if lamps.upper else []:
+    upper = lamps.upper
+    for led in upper.leds if upper else []:
         way = led.position - places
         distance = np.linalg.norm(way, axis=1)
         way /= distance[:, None]
         leaves = np.maximum(-way @ led.direction, 0)
         free = ~bodies.blocked(np.broadcast_to(led.position, places.shape), places, angle)
-        given = 1e6 * lamps.upper.candela * leaves / distance**2 * free if lamps.upper else 0.0
-        total += given[index] * np.maximum((normals * way[index]).sum(axis=1), 0)
+        flux = 1e6 * (upper.candela if upper else 0.0) * leaves / distance**2 * free
+        total += flux[index] * np.maximum((normals * way[index]).sum(axis=1), 0)
     return total
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
@@ -41,6 +42,7 @@ SAME_MM = 0.05  # by which facets are off the bodies that they stand for
 BRIGHT = 0.02  # of a recorded light
 HALF_TURN = np.array([-1.0, -1.0, 1.0])
 NONE = "no LEDs are above the object"
+Cylinders: TypeAlias = list[tuple[Floats, Floats, float]]  # ends and diameters, mm
 
 
 def checks(
@@ -93,8 +95,8 @@ def _faults(upper: UpperLamps, drawn: Mapping[str, Shape]) -> Iterator[str]:
 def _led_faults(led: UpperLed, upper: UpperLamps, drawn: Mapping[str, Shape]) -> Iterator[str]:
     """A board or rod that is drawn elsewhere than in its cylinders, which a merge leaves out."""
     board, rod = led.names
-    head = [(*led.head, upper.head_diameter)]
-    parts = [(*ends, upper.rod_diameter) for ends in pairwise(led.rod)]
+    head: Cylinders = [(led.head[0], led.head[1], upper.head_diameter)]
+    parts: Cylinders = [(*ends, upper.rod_diameter) for ends in pairwise(led.rod)]
     for name, cylinders in ((board, head), (rod, parts)):
         if name not in drawn:
             yield f"{name} is not drawn"
@@ -112,7 +114,7 @@ def _led_faults(led: UpperLed, upper: UpperLamps, drawn: Mapping[str, Shape]) ->
         yield f"{board} is not at the end of its head"
 
 
-def _outside(points: Floats, cylinders: list[tuple[Floats, Floats, float]]) -> float:
+def _outside(points: Floats, cylinders: Cylinders) -> float:
     """Greatest distance of points (N, 3) from the nearest of cylinders by ends and diameter, mm."""
     beyond = []
     for start, end, diameter in cylinders:
@@ -155,7 +157,8 @@ def _seen_normals(context: PrototypeContext) -> Floats:
             level = np.cos(tilt) * np.array([np.cos(way), np.sin(way)])
             normals.append([*level, np.sin(tilt)])
     every = np.array(normals)
-    return every[(every @ towards.T).max(axis=1) >= np.cos(np.radians(SEEN_DEG))]
+    seen = (every @ towards.T).max(axis=1) >= np.cos(np.radians(SEEN_DEG))
+    return np.asarray(every[seen])
 
 
 def _rays(measured: MeasuredPrototype, upper: UpperLamps) -> tuple[float, float]:
