@@ -213,7 +213,7 @@ class _Search:
                 *(_rod(k, points, pair, rod) for k, points in enumerate(rods, 1)),
             ),
             fasteners=_set_screw(self.site, pair),
-            listed={LED: 2, ROD: math.ceil(2 * pair.length / rod["length_mm"]), WIRE: metres}
+            listed={LED: 2, ROD: 2, WIRE: metres}
             | {circuit.part.name: 1},
             led=led,
             rod=rod,
