@@ -186,7 +186,7 @@ class _Search:
         if keep_out.to_swept(axes).min() < need + pair.thickness / 2:
             return False  # points first: they refuse most
         bar = list(_bar(self.site, pair).added)
-        heads = [cylinder_between(*ends, pair.board / 2) for ends in pair.heads()]
+        heads = [cylinder_between(low, high, pair.board / 2) for low, high in pair.heads()]
         rods = [body for points in pair.rods() for body in _rod_bodies(points, pair.thickness)]
         near = min_distance(keep_out.to_swept, [*bar, *heads, *rods], need)
         return near >= need and min_distance(keep_out.to_light, bar, need) >= need
@@ -213,8 +213,7 @@ class _Search:
                 *(_rod(k, points, pair, rod) for k, points in enumerate(rods, 1)),
             ),
             fasteners=_set_screw(self.site, pair),
-            listed={LED: 2, ROD: 2, WIRE: metres}
-            | {circuit.part.name: 1},
+            listed={LED: 2, ROD: 2, WIRE: metres} | {circuit.part.name: 1},
             led=led,
             rod=rod,
             places=pair.places(),

@@ -1,8 +1,8 @@
 """LEDs above the object: where they are, how evenly all is lit with them, what they hide.
 
 Compared is the irradiance of surfaces that some virtual camera sees at 60 degrees or less: in the
-middle, and on a sphere of two thirds of the target, which stands in its own light; all bodies of
-the assembly throw shadows, the base at some stops. Boards and rods are in the light of the balls: a
+middle, and on a sphere of two thirds of the target, which stands in its own light; all bodies but
+the stage throw shadows, the base at some stops. Boards and rods are in the light of the balls: a
 merge leaves out what they hide, so its share of the rays is limited.
 """
 
@@ -17,7 +17,12 @@ import numpy as np
 from tbcad_verify.mesh.surfaces import nearest_on_rays
 from tbcad_verify.mesh.vectors import norm, unit
 from tbcad_verify.prototype.assembly import Shape
-from tbcad_verify.prototype.bodies import AssembledBodies, MeasuredPrototype, some_angles
+from tbcad_verify.prototype.bodies import (
+    AssembledBodies,
+    MeasuredPrototype,
+    some_angles,
+    stage_bodies,
+)
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light.ball_views import pixel_rays, ray_transfer
 from tbcad_verify.prototype.light.lamp_light import irradiance
@@ -137,12 +142,12 @@ def _ratio(context: PrototypeContext, lamps: Lamps, bodies: AssembledBodies) -> 
     own = {lamp.name for lamp in lamps.places}
     for led in lamps.upper.leds if lamps.upper else []:
         own.add(led.names[0])
-    normals = _seen_normals(context)
-    worst = 0.0
+    in_the_way = bodies.without(stage_bodies(context) | own)  # the stage is part of the scene
+    normals, worst = _seen_normals(context), 0.0
     for size in (0.0, OBJECT_OF_TARGET * context.radius):
         points = size * normals
         for angle in some_angles(context).tolist():
-            light = irradiance(lamps, points, normals, bodies.without(own), angle)
+            light = irradiance(lamps, points, normals, in_the_way, angle)
             worst = max(worst, float(light.max() / max(light.min(), 1e-3)))
     return worst
 
