@@ -30,7 +30,8 @@ from tbcad.types import Floats
 
 LED, ROD, WIRE, SET_SCREW = "STAR-3535-8", "ROD-1.2x250", "ENAMELLED-0.2", "SET-M3x8"
 SUPPLY_V = 24.0
-UNEVEN, EVEN = 4.0, 3.8  # brightest over darkest surface, at most, and where it is enough
+# Brightest over darkest surface, at most: the verification, which has 4, samples others.
+UNEVEN = 3.8
 LOWEST_DEG, STEP_DEG = -60, 10  # of surfaces that virtual cameras see at 60 degrees or less
 OBJECT_OF_CAPTURE = 2 / 3  # an object that stands in its own light
 ELEVATIONS_DEG = (60.0, 57.5, 55.0, 52.5, 50.0, 62.5)
@@ -69,7 +70,7 @@ class UpperLamps(Mounted):
 
     def merit(self) -> tuple[bool, float]:
         """Better ones first: even enough, then by what they hide."""
-        return self.ratio > EVEN, self.hides if self.ratio <= EVEN else self.ratio
+        return self.ratio > UNEVEN, self.hides if self.ratio <= UNEVEN else self.ratio
 
     @property
     def candela(self) -> float:
