@@ -44,6 +44,7 @@ from tbcad.prototype.gravity.sag import Sag
 from tbcad.prototype.keepout import KeepOut, keep_out_volume, min_distance
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout, shroud_layout
+from tbcad.prototype.light.upper import UpperLamps
 from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.purchased.parts import Parts, load_parts
 from tbcad.prototype.registry import FRAME, PARTS
@@ -86,7 +87,9 @@ class PrototypeModel(Site):
         """The light on the object and the name of the camera."""
         lamps, mount = self.frame.find(LampLayout), self.frame.find(CameraMount)
         named = mount.chosen.name if mount and mount.chosen else None
-        return RigLight(lamps.lux if lamps else None, named)
+        upper = self.frame.find(UpperLamps)
+        more = upper.lux if upper else 0.0
+        return RigLight(lamps.lux + more if lamps else None, named)
 
     @property
     def purchased(self) -> dict[str, int]:
@@ -260,7 +263,8 @@ def _arranged(site: Site, balance: BaseBalance) -> PrototypeModel:
     spec, frame = site.spec, frame_layout(site)
     shroud, lamps = shroud_round(site, frame), frame.find(LampLayout)
     lamp_z = float(lamps.places[0, 2]) if lamps else 0.0
-    light = {"lamp_z_mm": lamp_z, "shroud": shroud is not None}
+    upper = frame.find(UpperLamps) is not None
+    light = {"lamp_z_mm": lamp_z, "upper": upper, "shroud": shroud is not None}
     chosen = with_camera(spec, site.layout.array)
     known = vars(site) | {
         "spec": _with(chosen, light=spec.prototype.light.model_copy(update=light)),
@@ -300,7 +304,7 @@ def _open_keys(spec: Spec) -> dict[str, object]:
 
 
 # Light goes into the first two; the stage's own limits hold for its post.
-MAY_BE_LIT = ("camera", "camera_lens", "stage_post")
+MAY_BE_LIT = ("camera", "camera_lens", "stage_post", "upper_board_*", "upper_rod_*")
 REMEDY = "prototype.frame.uprights_mm or prototype.largest_ball_mm smaller"
 
 
@@ -322,7 +326,7 @@ def _clearances(site: Site, frame: FrameLayout) -> tuple[dict[str, float], dict[
     light = {
         name: min_distance(keep_out.to_light, bodies)
         for name, bodies in static.items()
-        if name not in MAY_BE_LIT
+        if not any(fnmatchcase(name, one) for one in MAY_BE_LIT)
     }
     swept = {name: min_distance(keep_out.to_swept, bodies) for name, bodies in static.items()}
     obstacles = ("light of the balls", "balls and base as they swing")

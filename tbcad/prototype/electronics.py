@@ -14,7 +14,7 @@ Sources: grblHAL core gcode.c and issue 633; LinuxCNC M-codes, M62 to M65.
 
 import math
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.resources import files
 
 import numpy as np
@@ -31,24 +31,21 @@ from tbcad.prototype.assembly_steps.machine import (
     when,
 )
 from tbcad.prototype.light.lamp import LampLayout
+from tbcad.prototype.light.upper import SUPPLY_V as UPPER_SUPPLY_V
+from tbcad.prototype.light.upper import UpperLamps
 from tbcad.prototype.part import FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_part, of_kind
+from tbcad.prototype.resistors import SeriesResistor, series_resistor
 from tbcad.prototype.stage import crown
 from tbcad.prototype.stage.layout import StageLayout
 from tbcad.records.prototype_drive import Phase
 from tbcad.records.tables import WiringRow
 
 LAMP_OUTPUT, LAMP = 0, "lamp"
+UPPER_LAMPS = "upper_lamps"  # on the lamps' output
 MAX_OUTPUTS = 8  # digital outputs of the boards in boards.csv, at most
 COOLANT_OUTPUTS = 1  # that releases the camera
 DARK, LIT = "dark", "lit"
-# Two digits of each decade.
-E24 = (
-    *(10, 11, 12, 13, 15, 16, 18, 20, 22, 24, 27, 30),
-    *(33, 36, 39, 43, 47, 51, 56, 62, 68, 75, 82, 91),
-)
-DERATING = 2.0  # rated power over dissipated power, so that a resistor stays below 100 degrees C
-ROUNDING = 1e-9
 DIGITAL, BY_MODULE = "digital", "by a switch module"
 LETS_FALL = "The supply's switch, its plug and its fuse let it fall."
 OWN_WIRES = ("motor", "supply")  # lines whose way is told instead of an output
@@ -125,62 +122,6 @@ def phases(leds: int, motion: MotionSpec) -> tuple[Phase, ...]:
 
 
 @dataclass(frozen=True)
-class SeriesResistor:
-    """A resistor in series with an LED."""
-
-    part: PurchasedPart  # to buy; its name has value and rating
-    ohm: float  # value
-    current_ma: float  # that the LED gets, mA
-    dissipation_w: float  # of the resistor while the LED is on, W
-
-
-def e24_at_least(ohm: float) -> float:
-    """The smallest value of the series that is no smaller than a resistance (ohm)."""
-    decade = 10.0 ** (math.floor(math.log10(ohm)) - 1)
-    values = (round(digits * step, 9) for step in (decade, 10 * decade) for digits in E24)
-    return next(value for value in values if value >= ohm * (1 - ROUNDING))
-
-
-def series_resistor(
-    led: PurchasedPart, max_ma: float, supply_v: float, parts: Parts, number: int = 1
-) -> SeriesResistor:
-    """The resistor with which LEDs in series get a current (mA), or less, from a supply (V).
-
-    SpecError when the LED bears less, the supply is too low, or no resistor is large enough.
-    """
-    forward = number * led["forward_v"]
-    if max_ma > led["max_ma"]:
-        raise SpecError(
-            f"prototype.stage.led_ma {max_ma:g} is more than {led.name} bears: make it "
-            f"{led['max_ma']:g} or less"
-        )
-    if supply_v <= forward:
-        raise SpecError(
-            f"prototype.stage.led_supply_v {supply_v:g} does not light {led.name} of {forward:g} "
-            f"V: make it greater than {forward:g}"
-        )
-    ohm = e24_at_least((supply_v - forward) / max_ma * 1e3)
-    current = (supply_v - forward) / ohm
-    dissipation = current**2 * ohm
-    rated = _rated(DERATING * dissipation, parts)
-    part = replace(
-        rated, name=f"{rated.name}-{ohm:g}", what=f"{rated.what}, {ohm:g} ohm of the series E24"
-    )
-    return SeriesResistor(part, ohm, current * 1e3, dissipation)
-
-
-def _rated(watts: float, parts: Parts) -> PurchasedPart:
-    """The smallest resistor that is rated for a power."""
-    enough = [part for part in of_kind(parts, "resistors") if part["power_w"] >= watts]
-    if not enough:
-        raise SpecError(
-            f"no resistor of {watts:.1f} W is in resistors.csv: make prototype.stage.led_ma or "
-            "prototype.stage.led_supply_v smaller"
-        )
-    return min(enough, key=lambda part: part["power_w"])
-
-
-@dataclass(frozen=True)
 class LedCircuit:
     """The circuit of the LEDs, which are alike."""
 
@@ -212,11 +153,13 @@ class Wiring(Mounted):
     rows: tuple[Row, ...]
     circuit: LedCircuit | None  # of the LEDs, None without any
     board: PurchasedPart  # of the controller
+    upper: SeriesResistor | None = None  # of the LEDs above the object, None without any
 
     @property
     def parts(self) -> Parts:
         """Parts that no list has by this name: the resistor of a value."""
-        return {one.name: one for one in ([self.circuit.resistor.part] if self.circuit else [])}
+        some = [one.part for one in (self.circuit and self.circuit.resistor, self.upper) if one]
+        return {one.name: one for one in some}
 
 
 def wiring_layout(site: Site, before: FrameLayout) -> Wiring:
@@ -227,14 +170,17 @@ def wiring_layout(site: Site, before: FrameLayout) -> Wiring:
     # Of each LED's cable down to its groove, inward, down the post, to the controller.
     length = norm(leds[:, :2]) + leds[:, 2] - spec.frame.floor_mm
     length = CUT_MM * np.ceil((length + CHANNEL_MM + LEAD_MM + crown.GROOVE_MM) / CUT_MM)
+    upper = before.find(UpperLamps)
     rows = [_lamp_cells(before.find(LampLayout), spec.stage.led_supply_v)]
+    rows += [_upper_cells(upper)] if upper else []
     listed = {board.name: 1}
     if circuit:
         rows += [_led_cells(site, circuit, i, one) for i, one in enumerate(length.tolist())]
         metres = math.ceil(WIRES * float(length.sum()) / METRE_MM)
         listed |= {circuit.resistor.part.name: len(leds), circuit.connector.name: 1}
         listed |= {circuit.wire.name: metres}
-    modules = sum(_needs_module(cells, board) for cells in rows) if outputs else 0
+    switched = [cells for cells in rows if cells["signal"] != UPPER_LAMPS]  # that is the lamps'
+    modules = sum(_needs_module(cells, board) for cells in switched) if outputs else 0
     rows = [_row(cells, outputs, board) for cells in rows]
     if motion.trigger == "coolant":
         rows, listed = [*rows, RELEASE], listed | {"RELAY": 1}
@@ -251,6 +197,7 @@ def wiring_layout(site: Site, before: FrameLayout) -> Wiring:
         rows=tuple({**empty, **row, "line": number} for number, row in enumerate(rows, 1)),
         circuit=circuit,
         board=board,
+        upper=upper.circuit if upper else None,
     )
 
 
@@ -271,7 +218,8 @@ def _needs_module(cells: Row, board: PurchasedPart) -> bool:
 
 def _row(cells: Row, outputs: dict[str, int], board: PurchasedPart) -> Row:
     """A light's row, with what switches it; without an output it is switched by hand."""
-    output = outputs.get(str(cells["signal"]))
+    signal = LAMP if cells["signal"] == UPPER_LAMPS else str(cells["signal"])
+    output = outputs.get(signal)
     if output is None:
         return {"connector": BOARD, "output": "by hand", **cells}
     on, off = f"M64 P{output}", f"M65 P{output}"
@@ -289,6 +237,18 @@ def _lamp_cells(lamps: LampLayout | None, supply_v: float) -> Row:
     length = CABLE_MM + BETWEEN_LAMPS_MM * (len(lamps.places) - 1)
     more: Row = {"length_mm": length, "current_ma": lamps.current_ma, "path": LAMP_PATH}
     return {**cable, **strip, **more}
+
+
+def _upper_cells(upper: UpperLamps) -> Row:
+    """The line of the LEDs above the object, in series, on the lamps' output."""
+    circuit = upper.circuit
+    return {
+        **{"signal": UPPER_LAMPS, "part": upper.led.name, "wire": CABLE, "length_mm": CABLE_MM},
+        **{"supply_v": UPPER_SUPPLY_V, "forward_v": 2 * upper.led["forward_v"]},
+        **{"resistor": circuit.part.name, "resistor_ohm": circuit.ohm},
+        **{"current_ma": circuit.current_ma, "dissipation_w": circuit.dissipation_w},
+        "path": "both in series, down along the post, by the resistor; minus with the lamps'",
+    }
 
 
 def _led_cells(site: Site, circuit: LedCircuit, index: int, length: float) -> Row:

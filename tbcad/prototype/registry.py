@@ -11,11 +11,12 @@ from tbcad.prototype.frame.stock import FEET, STOCK
 from tbcad.prototype.homing import HOMING, ZERO
 from tbcad.prototype.light.lamps import LAMPS
 from tbcad.prototype.light.shroud import SHROUD
+from tbcad.prototype.light.upper import UPPER
 from tbcad.prototype.stage.foot import STAGE
 
 PARTS = (
-    *(COUPON, STOCK, CARRIER, CAPS, FEET, HEAD, DRIVE, HOMING, LAMPS, STAGE, CAMERA),
+    *(COUPON, STOCK, CARRIER, CAPS, FEET, HEAD, DRIVE, HOMING, LAMPS, STAGE, UPPER, CAMERA),
     *(WIRING, ZERO, GAUGE, BALLS, SHROUD, FIRST),
 )
-FRAME = HEAD, FEET, STAGE, HOMING, CAMERA, LAMPS, WIRING, GAUGE, STOCK
+FRAME = HEAD, FEET, STAGE, HOMING, CAMERA, LAMPS, UPPER, WIRING, GAUGE, STOCK
 """Each is laid out beside those before it: the head first, the stock under all last."""

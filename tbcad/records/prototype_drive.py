@@ -121,6 +121,42 @@ class LampPlace(RecordSection):
     direction: Vector
 
 
+class UpperLed(RecordSection):
+    """An LED above the object: its shining face's middle, and the rod that carries it.
+
+    Attributes:
+        names: of its board and its rod.
+        direction: that it shines in, a unit vector.
+        head_mm: the ends of the cylinder round LED, board and what is glued on it.
+        rod_mm: start on the board's back, elbow, and lower end.
+    """
+
+    names: tuple[str, str]
+    position_mm: Vector
+    direction: Vector
+    head_mm: tuple[Vector, Vector]
+    rod_mm: tuple[Vector, Vector, Vector]
+
+
+class UpperLampsRecord(RecordSection):
+    """What lights surfaces that face up, and what it hides.
+
+    Attributes:
+        part: the LED, in the list of parts.
+        candela_each: along the direction of each, in its current.
+        tolerance_mm: by which boards and rods may be beside their places; a merge leaves out all
+            rays that come so near to them.
+    """
+
+    part: str
+    leds: tuple[UpperLed, ...] = Field(min_length=1, max_length=100)
+    candela_each: float = Field(gt=0, le=1e6)
+    current_ma: float = Field(gt=0, le=1e6)
+    head_diameter_mm: float = Field(gt=0, le=1000)
+    rod_diameter_mm: float = Field(gt=0, le=1000)
+    tolerance_mm: float = Field(ge=0, le=1000)
+
+
 class LampsRecord(RecordSection):
     """What lights the object.
 
@@ -141,6 +177,7 @@ class LampsRecord(RecordSection):
     lumen_each: float = Field(gt=0, le=1e6)
     watt: Finite
     current_ma: Finite
+    upper: UpperLampsRecord | None = None
 
 
 class CardPanel(RecordSection):

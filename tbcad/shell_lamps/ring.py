@@ -24,9 +24,9 @@ from tbcad.core.optics.mirror_light import (
 )
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.section import AUTO
-from tbcad.prototype.electronics import SeriesResistor, series_resistor
 from tbcad.prototype.frame.chosen_camera import chosen_camera
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart
+from tbcad.prototype.resistors import SeriesResistor, series_resistor
 from tbcad.types import Floats
 
 LED, SET_SCREW, INSERT = "STAR-3535", "SET-M3x8", "INSERT-M3"

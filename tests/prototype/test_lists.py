@@ -13,10 +13,11 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.drive.drive import Drive, load_drives
-from tbcad.prototype.electronics import e24_at_least, led_circuit, series_resistor, wiring_layout
+from tbcad.prototype.electronics import led_circuit, wiring_layout
 from tbcad.prototype.files.bom import ALWAYS, PrintedItem, bom_rows, totals
 from tbcad.prototype.part import FrameLayout, Site
 from tbcad.prototype.purchased.parts import Prices, load_parts, load_prices, of_kind
+from tbcad.prototype.resistors import e24_at_least, series_resistor
 from tbcad.prototype.stage.layout import StageLayout
 
 PARTS = load_parts()

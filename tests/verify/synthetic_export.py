@@ -33,7 +33,7 @@ CHOSEN: dict[str, dict[str, Any]] = {
     },
     "base": {"pad_angle_deg": 50.0, "hold": "magnet", "hub_boss_mm": 20.0},
     "stage": {"top_mm": -20.0, "disc_mm": 17.0, "object_diameter_mm": 40.0, "leds_mm": []},
-    "light": {"lamp_z_mm": 0.0, "shroud": False},
+    "light": {"lamp_z_mm": 0.0, "upper": False, "shroud": False},
     "frame": {
         "floor_mm": -230.0,
         "camera_axis_mm": 30.0,

@@ -1,6 +1,7 @@
 """What the cameras see the object in: the recorded spheres, the meshes, or the prototype."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 
 from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
@@ -12,6 +13,7 @@ from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.light.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
+from tbcad.light.simulate.scene.upper_lamps import upper_screen
 from tbcad.options.captures import Geometry
 from tbcad.types import Progress
 
@@ -31,8 +33,12 @@ def camera_photographs(
     """
     if geometry == "prototype":
         both = prototype_runs(export.reflectors, read_plan(export))
+        # Photographs show what hides the object; the merge leaves out a little more.
+        seen = replace(scene, screen=upper_screen(export.folder))
+        wider = upper_screen(export.folder, wider=True)
         return [
-            (ball_reflector(run), partial(merge_run, run, scene, samples, progress)) for run in both
+            (ball_reflector(run), partial(merge_run, run, seen, samples, progress, wider))
+            for run in both
         ]
     if isinstance(samples, RealOptics):
         return [

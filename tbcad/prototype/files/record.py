@@ -6,7 +6,7 @@ import numpy as np
 
 from tbcad.cad.drafting.sheet import Sheet
 from tbcad.cad.formats.checked_files import Row
-from tbcad.core.geometry.vectors import norm
+from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.spec.prototype import MotionSpec
 from tbcad.prototype.arrangement import PrototypeModel
 from tbcad.prototype.base.caps import cap_limits, holding
@@ -29,6 +29,7 @@ from tbcad.prototype.frame.stock import Stock
 from tbcad.prototype.homing import HomingLayout
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.shroud import ShroudLayout
+from tbcad.prototype.light.upper import TOLERANCE_MM, WIRES_MM, UpperLamps
 from tbcad.prototype.printed import PrintedPart
 from tbcad.prototype.stage.layout import led_poses
 from tbcad.prototype.stage.leds import calibration_estimate
@@ -42,6 +43,8 @@ from tbcad.records.prototype_drive import (
     LampPlace,
     LampsRecord,
     ShroudRecord,
+    UpperLampsRecord,
+    UpperLed,
 )
 
 STEP, GLB, BALLS_FILE = "prototype.step", "prototype.glb", "balls.csv"
@@ -100,7 +103,7 @@ def prototype_record(built: PrototypeModel, bill: list[Row], drawings: list[Shee
             )
             for item in frame.purchased
         ),
-        lamps=_lamps(frame.find(LampLayout)),
+        lamps=_lamps(frame.find(LampLayout), frame.find(UpperLamps)),
         shroud=_shroud(built.shroud),
         fasteners=tuple(map(_fastener, built.fasteners)),
         frame_stock=records.FrameStock(
@@ -232,7 +235,7 @@ def _camera_place(built: PrototypeModel) -> records.CameraPlace | None:
     )
 
 
-def _lamps(lamps: LampLayout | None) -> LampsRecord | None:
+def _lamps(lamps: LampLayout | None, upper: UpperLamps | None) -> LampsRecord | None:
     if lamps is None:
         return None
     places, inward = (lamps.places + 0.0).tolist(), (lamps.inward + 0.0).tolist()
@@ -249,6 +252,29 @@ def _lamps(lamps: LampLayout | None) -> LampsRecord | None:
         lumen_each=lamps.lumen,
         watt=lamps.watt,
         current_ma=lamps.current_ma,
+        upper=_upper(upper) if upper else None,
+    )
+
+
+def _upper(upper: UpperLamps) -> UpperLampsRecord:
+    leds = zip(upper.places, upper.heads, upper.rods, strict=True)
+    return UpperLampsRecord(
+        part=upper.led.name,
+        leds=tuple(
+            UpperLed(
+                names=(f"upper_board_{k}", f"upper_rod_{k}"),
+                position_mm=(place + 0.0).tolist(),
+                direction=(-unit(place) + 0.0).tolist(),
+                head_mm=(head + 0.0).tolist(),
+                rod_mm=(rod + 0.0).tolist(),
+            )
+            for k, (place, head, rod) in enumerate(leds, 1)
+        ),
+        candela_each=upper.candela,
+        current_ma=upper.circuit.current_ma,
+        head_diameter_mm=upper.led["diameter_mm"],
+        rod_diameter_mm=upper.rod["outer_mm"] + WIRES_MM,
+        tolerance_mm=TOLERANCE_MM,
     )
 
 

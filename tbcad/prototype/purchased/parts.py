@@ -20,7 +20,7 @@ KINDS = (
     *("motors", "stages", "wheels", "belts", "couplings", "shafts", "bearings", "screws"),
     *("setscrews", "inserts", "dowels", "magnets", "leds", "strips", "stars", "sheets"),
     *("resistors", "wires", "connectors", "boards", "electronics", "extrusions", "tnuts", "nuts"),
-    *("washers", "collars", "spacers", "brakes", "plates", "brackets", "tubes", "clamps"),
+    *("washers", "collars", "spacers", "brakes", "plates", "brackets", "tubes", "clamps", "rods"),
 )
 """Lists of parts, in the order in which they are listed. Their own columns are sizes above zero.
 

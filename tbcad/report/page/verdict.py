@@ -183,8 +183,8 @@ def _yields(yields: Sequence[ProcessYield]) -> str:
         f"<td class=n>{one.coverage_mm:.2f} mm</tr>"
         for one in yields
     )
-    head = "<table class=made><thead><tr><th>Process<th colspan=2>Yield<th>Coverage</tr></thead><tbody>"
-    return f"{head}{''.join(rows)}</tbody></table>"
+    heads = "<tr><th>Process<th colspan=2>Yield<th>Coverage</tr>"
+    return f"<table class=made><thead>{heads}</thead><tbody>{''.join(rows)}</tbody></table>"
 
 
 def checks_html(verdict: Verdict | None) -> Iterator[str]:

@@ -17,6 +17,7 @@ from tbcad.light.simulate.prototype.merge import merge_photographs, merge_plan
 from tbcad.light.simulate.prototype.run import PrototypeRun, ball_reflector
 from tbcad.light.simulate.scene.rays import meets_sphere
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
+from tbcad.light.simulate.scene.upper_lamps import upper_screen
 from tbcad.options.machines import MergeOptions
 from tbcad.records.run import LIT, Frame, exposure_name
 from tbcad.records.tables import RayRow
@@ -59,6 +60,7 @@ class HalfMerge:
     run: PrototypeRun  # where camera and balls are
     photographs: CorrectedPhotographs
     pixels: Ints  # of each mirror with a ray, filled in as the merge goes on, (m,)
+    screen: Any | None = None  # bodies before the object, with their tolerance
 
     @property
     def camera_id(self) -> str:
@@ -71,7 +73,7 @@ class HalfMerge:
         frames = enumerate(self.photographs.frames)
         # The first stop with a photograph also shows what is on no mirror.
         direct = next((stop for stop, frame in frames if frame is not None), 0)
-        plan = merge_plan(self.run, capture_mm / 2, in_front, direct)
+        plan = merge_plan(self.run, capture_mm / 2, in_front, direct, self.screen)
         for band in merge_photographs(plan, self.photographs, progress):
             mirror = band.rays.mirror.ravel()
             self.pixels[:] += np.bincount(mirror, minlength=len(self.pixels) + 1)[1:]
@@ -148,6 +150,8 @@ def _halves(
     plan = plan_of(export, run.record.geometry, run.record.frames)
     corrected, exposure = corrections(options, machine.camera), common_exposure(run)
     known, stops = stops_known(plan, frames), range(len(plan.angle))
+    of_prototype = run.record.geometry == "prototype"
+    screen = upper_screen(export.folder, wider=True) if of_prototype else None
     halves = []
     for half, turn in enumerate(TURNS):
         if (plan.ball[half] == NOT_SERVED).any():
@@ -157,7 +161,8 @@ def _halves(
         missing = {stop: "the run leaves this stop out" for stop in stops if stop not in of_stop}
         photographs = CorrectedPhotographs(run, shown, corrected, exposure, missing)
         placed = machine_run(export, plan, machine, frames, half)
-        halves.append(HalfMerge(placed, photographs, np.zeros(len(placed.stop), dtype=np.int64)))
+        pixels = np.zeros(len(placed.stop), dtype=np.int64)
+        halves.append(HalfMerge(placed, photographs, pixels, screen))
     return halves
 
 

@@ -21,6 +21,7 @@ from tbcad.light.simulate.prototype.ball_rays import (
 )
 from tbcad.light.simulate.prototype.run import HALF_TURN, SPHERES
 from tbcad.light.simulate.scene.ray_casting import embree_scene
+from tbcad.light.simulate.scene.upper_lamps import upper_facets
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
 from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.types import Bools, Floats, Ints
@@ -59,9 +60,10 @@ def _nearer(scene: Any | None, origin: Floats, direction: Floats, length: Floats
 
 
 def stage_scene(folder: Path) -> Any | None:
-    """The stage's printed parts of a build in their places; None where it has none."""
+    """Stage's printed parts of a build, and rods and boards of the LEDs above; None: none."""
     parts = Prototype.read(folder / NAME).with_role("stage")
-    facets = [_placed(folder, part) for part in parts]
+    facets = [*(_placed(folder, part) for part in parts), upper_facets(folder)]
+    facets = [one for one in facets if len(one)]
     return embree_scene(np.concatenate(facets)) if facets else None
 
 

@@ -22,6 +22,7 @@ from tbcad.light.simulate.scene.object import SceneObject, built_in_object
 from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.light.simulate.scene.upper_lamps import upper_screen
 from tbcad.options.machines import SimulateRunOptions
 from tbcad.options.shared import exposures
 from tbcad.output.folder import check_replaceable, replacing
@@ -91,6 +92,8 @@ def prepare_run(
     # Before a shell nothing stands, and its object is as bright from all sides.
     lamps = None if options.shell else read_lamps(export.folder)
     scene = prepared_scene(lit_by(lamps, subject) if lamps else subject)
+    if not options.shell:
+        scene = replace(scene, screen=upper_screen(export.folder))
     stage = None if options.shell else stage_scene(export.folder)
     occluders = Occluders(scene.embree, stage)
     chain = ImagingChain(

@@ -8,9 +8,9 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from tbcad.core.optics.lamp_light import RectangularLamps, irradiance
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import StageSpec
-from tbcad.light.simulate.scene.lamps import RectangularLamps, irradiance
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.frame.shared import BearingHead
 from tbcad.prototype.keepout import KeepOut

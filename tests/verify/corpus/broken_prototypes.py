@@ -437,6 +437,9 @@ FAILING: Broken = {
         "lamps: one aside": (record(LAMP_X, plus(30.0)), "is drawn elsewhere"),
         "lamps: not listed": (record("lamps", None), "the record has none"),
     },
+    ("upper lamps", GLB): {
+        "upper lamps: asked for": (asked("light/upper", True), "the record has none")
+    },
     ("light before and after", RECORD): {
         "lamps: light from one": (record(LAMP_X, plus(30.0)), "turn"),
         "lamps: one behind an upright": (drawn_away("upright_left", 60.0), "half turn"),

@@ -79,6 +79,7 @@ def remembered() -> Iterator[None]:
         ("prototype.swing", "sweep", _sweep_key),
         ("prototype.stages", "pixel_rays", _rays_key),
         ("prototype.light.lamp_light", "irradiance", _light_key),
+        ("prototype.light.upper_lamps", "irradiance", _light_key),
         *((module, name, _given) for module, names in PURE.items() for name in names),
     )
     with ExitStack() as stack:

@@ -50,6 +50,8 @@ NOT_MADE = {
     *("inventory", "leds as designed", "assembly step", "plate holes", "drawings"),
     *("fasteners", "fastener holes", "key access", "homing", "controller settings", "klipper"),
     *("camera mount", "camera gauge", "cap tilt", "plays", "shroud", "radius rule"),
+    *("upper lamps", "light ratio of the prototype", "hidden by upper lamps"),
+    "glare of upper lamps",
     *("lamps", "light before and after", "light of the lamps", "light from above"),
     *("light in the stage's shadow", "hold ratio", "drive", "motor bearing", "power off"),
     *("fall energy", "axial chain", "object room", "leds seen", "part files"),

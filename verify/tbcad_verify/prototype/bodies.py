@@ -135,6 +135,13 @@ def stage_bodies(context: PrototypeContext) -> frozenset[str]:
     return frozenset(parts | {one.name for one in some if one.through[0] in parts})
 
 
+def upper_bodies(context: PrototypeContext) -> frozenset[str]:
+    """Names of boards and rods of the LEDs above the object."""
+    lamps = context.prototype.lamps
+    leds = lamps.upper.leds if lamps and lamps.upper else []
+    return frozenset(name for led in leds for name in led.names)
+
+
 def some_angles(context: PrototypeContext) -> Floats:
     """(s,) base angles of some of the stops, evenly, the outermost included, rad."""
     angles = np.unique(context.angle)
@@ -159,6 +166,8 @@ class MeasuredPrototype:
     mirrors: PreparedSurfaces  # the reflecting spheres, for rays from the pinhole
     rotating: BodyScene  # base, caps, and what is fastened to them
     fixed: BodyScene  # all else
+    # boards and rods of LEDs above the object, which are in the light and may hide some of it
+    above: BodyScene = field(default_factory=lambda: body_scene({}))
 
 
 def measure_prototype(
@@ -191,7 +200,8 @@ def measure_prototype(
     surfaces = Surfaces(centre + radius * normal, normal, 1 / radius)
     bought = drawn.keys() - {*VIEWS, *OWN, *(part.part.name for part in parts)}
     bought = {name for name in bought if not name.startswith("ball_")}
-    swung = turning(context, ())
+    swung, above = turning(context, ()), upper_bodies(context)
+    still = placed_meshes(of_roles(parts, *STILL)) | _meshes(drawn, sorted(bought - swung))
     turned = placed_meshes(of_roles(parts, *SWUNG)) | _meshes(drawn, sorted(bought & swung))
     return MeasuredPrototype(
         context,
@@ -202,7 +212,8 @@ def measure_prototype(
         body_radius,
         prepare_for_rays(context.pinhole, surfaces),
         body_scene({name: moved(name, mesh) for name, mesh in turned.items()}),
-        body_scene(placed_meshes(of_roles(parts, *STILL)) | _meshes(drawn, sorted(bought - swung))),
+        body_scene({name: mesh for name, mesh in still.items() if name not in above}),
+        body_scene({name: mesh for name, mesh in still.items() if name in above}),
     )
 
 

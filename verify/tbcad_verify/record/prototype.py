@@ -222,6 +222,32 @@ class Lamp(Strict):
     direction: Vector
 
 
+Ends = Annotated[list[Vector], Field(min_length=2, max_length=2)]
+
+
+class UpperLed(Strict):
+    """An LED above the object: its shining face, and ends of cylinders, (3,), mm."""
+
+    names: Annotated[list[Name], Field(min_length=2, max_length=2)]  # of board and rod
+    position: Vector = Field(alias="position_mm")
+    direction: Vector
+    head: Ends = Field(alias="head_mm")  # round board and what is on it
+    # start on the board, elbow and end of its rod
+    rod: Annotated[list[Vector], Field(alias="rod_mm", min_length=3, max_length=3)]
+
+
+class UpperLamps(Strict):
+    """LEDs that light what faces up."""
+
+    part: str = Field(max_length=WIDEST)  # name of the LED in the parts list
+    leds: list[UpperLed] = Field(min_length=1, max_length=MOST)
+    candela: float = Field(alias="candela_each", gt=0, le=LARGEST)
+    current_ma: float = Field(gt=0, le=LARGEST)
+    head_diameter: float = Field(alias="head_diameter_mm", gt=0, le=LARGEST)
+    rod_diameter: float = Field(alias="rod_diameter_mm", gt=0, le=LARGEST)
+    tolerance: float = Field(alias="tolerance_mm", ge=0, le=LARGEST)  # that a merge leaves out
+
+
 class Lamps(Strict):
     """The lamps of the object."""
 
@@ -232,6 +258,7 @@ class Lamps(Strict):
     width: float = Field(alias="width_mm", gt=0, le=LARGEST)
     level: bool  # whether they lie level, else they are upright
     places: list[Lamp] = Field(min_length=1, max_length=MOST)  # of all lamps
+    upper: UpperLamps | None = None  # above the object; None without any
 
 
 class Panel(Strict):

@@ -178,6 +178,7 @@ class LightSpec(Strict):
     lamp_z_mm: Annotated[float, Field(ge=-1000, le=0), OR_AUTO]
     strips: int = Field(ge=1, le=6)
     segments: int = Field(ge=1, le=6)
+    upper: Annotated[bool, OR_AUTO] = False  # which builds before it do not have
     shroud: Annotated[bool, OR_AUTO]
     shroud_gap_mm: float = Field(ge=2, le=500)
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ from tbcad.light.simulate.prototype.run import PrototypeRun
 from tbcad.light.simulate.scene.ray_casting import Scene, object_in_front
 from tbcad.light.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
 from tbcad.light.simulate.scene.reflector import MARGIN_PX
+from tbcad.light.simulate.scene.upper_lamps import hidden_rays
 from tbcad.types import Bools, Bytes, Floats, Ints, Progress
 
 NO_BALL = -1  # in place of a ball's number: what is on no mirror is shown by no ball
@@ -65,15 +66,20 @@ class MergePlan:
     rotation: Floats  # of directions, (1 + m, 3, 3)
     stop: Ints  # whose photograph is used, (1 + m,)
     ball: Ints  # in place of the mirror, from 1, (1 + m,)
+    screen: Any | None = None  # bodies, with their tolerance, that hide rays; None without any
 
 
 def merge_plan(
-    run: PrototypeRun, object_radius: float, in_front: InFront, direct_stop: int = 0
+    run: PrototypeRun,
+    object_radius: float,
+    in_front: InFront,
+    direct_stop: int = 0,
+    screen: Any | None = None,
 ) -> MergePlan:
     """Prepare a merge of a run.
 
     The object is in a sphere about the origin of `object_radius`, mm; the photograph of
-    `direct_stop`, from 0, shows it itself.
+    `direct_stop`, from 0, shows it itself. A screen, as of `upper_screen`, hides rays.
     """
     return MergePlan(
         run,
@@ -83,6 +89,7 @@ def merge_plan(
         np.concatenate([np.eye(3)[None], run.window_rotation]),
         np.append(direct_stop, run.stop),
         np.append(NO_BALL, run.ball + 1),
+        screen,
     )
 
 
@@ -121,6 +128,9 @@ def merged_pixels(plan: MergePlan, rows: range) -> tuple[Ints, BallHits, Bools]:
     )
     inside = np.isfinite(image_points(run.camera, direction)[:, 0])
     ball = np.where(inside & (hits.ball == plan.ball[mirror]), hits.ball, 0)
+    on = np.flatnonzero(ball)
+    hidden = hidden_rays(plan.screen, run.camera.pinhole, hits.origin[on], hits.direction[on])
+    ball[on[hidden]] = 0
     front = inside & plan.in_front(mirror, direction, hits.distance)
     return mirror, replace(hits, ball=ball), front
 
@@ -227,8 +237,12 @@ def merge_run(
     scene: Scene,
     samples: Samples | RealOptics = 1,
     progress: Progress = lambda _: None,
+    screen: Any | None = None,
 ) -> Iterator[RowBand]:
-    """Bands of the merged picture; pixels of photographs are means of `samples`, or real."""
+    """Bands of the merged picture; pixels of photographs are means of `samples`, or real.
+
+    The scene has bodies before the object as they are, the screen with their tolerance.
+    """
     photographs = SimulatedPhotographs(run, scene, samples)
-    plan = merge_plan(run, scene.radius, photographs.in_front)
+    plan = merge_plan(run, scene.radius, photographs.in_front, screen=screen)
     yield from merge_photographs(plan, photographs, progress)

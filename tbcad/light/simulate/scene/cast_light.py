@@ -15,8 +15,9 @@ from tbcad.core.geometry.loop_vectors import dot as loop_dot
 from tbcad.core.geometry.loop_vectors import minus, plus_scaled, unit, vector
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.geometry.vectors import unit as unit_rows
+from tbcad.core.optics.lamp_light import RectangularLamps, lambertian
 from tbcad.core.optics.mirror_light import Lamps, direct_light
-from tbcad.light.simulate.scene.lamps import EXPOSED, RectangularLamps, free_rays, tile_irradiance
+from tbcad.light.simulate.scene.lamps import EXPOSED, free_rays
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.types import Bools, Floats, Ints
 
@@ -59,13 +60,14 @@ class CastLight:
 
 
 def lamp_sources(lamps: RectangularLamps) -> list[Source]:
-    """The tiles of a prototype's lamps, lux."""
-    sources = []
-    middles, facing = lamps.tiles()
-    each = len(middles) // len(lamps.places)
-    for k, (middle, way) in enumerate(zip(middles, facing, strict=True)):
-        sources.append(Source(middle, tile_irradiance(lamps, middle, way), k // each))
-    return sources
+    """The tiles of a prototype's lamps, and its LEDs above, lux."""
+    places, facing, candela = lamps.sources()
+    tiles, count = len(places) - len(lamps.leds), len(lamps.places)
+    number = [*np.repeat(range(count), tiles // count), *range(count, count + len(lamps.leds))]
+    each = zip(places[:, None], facing[:, None], candela[:, None], strict=True)
+    return [
+        Source(one[0][0], partial(lambertian, *one), k) for one, k in zip(each, number, strict=True)
+    ]
 
 
 def led_sources(lamps: Lamps) -> list[Source]:

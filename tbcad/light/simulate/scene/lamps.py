@@ -4,8 +4,6 @@ The rectangular lamps of a prototype are fixed to the object: they stand so that
 leaves the light as it was. They cast no shadows, as the built-in light.
 """
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,15 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.core.geometry.vectors import dot, norm
+from tbcad.core.optics.lamp_light import RectangularLamps, irradiance
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.types import Bools, Floats
 
 # Rays toward a lamp begin so far above the facet that they do not meet it again by rounding, mm.
 ABOVE_FACET_MM = 1e-3
-TILES = (2, 5)  # across and along a lamp's face
 EXPOSED = 99.0  # percentile of the light on the object that a photograph shows as white
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -87,26 +84,6 @@ def lamp_light(embree: Any, spots: Spots, lights: PointLights) -> Floats:
     return total
 
 
-@dataclass(frozen=True)
-class RectangularLamps:
-    """Equal rectangular lamps, upright or level, with Lambertian faces."""
-
-    places: Floats  # middles of the faces, mm, (l, 3)
-    inward: Floats  # unit directions that they face, level, (l, 3)
-    width: float  # of a face, across, mm
-    length: float  # of a face, upward, mm
-    lumen: float  # light of each
-
-    def tiles(self) -> tuple[Floats, Floats]:
-        """Middles (t, 3) of the tiles of all faces, and the directions that they face, (t, 3)."""
-        sides = zip(TILES, (self.width, self.length), strict=True)
-        across, along = (((np.arange(n) + 0.5) / n - 0.5) * size for n, size in sides)
-        x, z = (values.ravel() for values in np.meshgrid(across, along, indexing="ij"))
-        side = np.cross(UP, self.inward)
-        middles = self.places[:, None] + x[:, None] * side[:, None] + z[:, None] * UP
-        return middles.reshape(-1, 3), np.repeat(self.inward, len(x), axis=0)
-
-
 def read_lamps(folder: Path) -> RectangularLamps | None:
     """The lamps of a build's prototype; None where it has none.
 
@@ -118,36 +95,15 @@ def read_lamps(folder: Path) -> RectangularLamps | None:
     places = np.array([place.position_mm for place in found.places])
     inward = np.array([place.direction for place in found.places])
     sides = found.width_mm, found.length_mm
+    upper = found.upper
     return RectangularLamps(
-        places, inward, *(sides[::-1] if found.level else sides), found.lumen_each
+        places,
+        inward,
+        *(sides[::-1] if found.level else sides),
+        found.lumen_each,
+        np.array([led.position_mm for led in upper.leds] if upper else []).reshape(-1, 3),
+        upper.candela_each if upper else 0.0,
     )
-
-
-def irradiance(lamps: RectangularLamps, points: Floats, normals: Floats) -> Floats:
-    """Irradiance (n,) of surfaces at points (n, 3) with unit normals (n, 3), lux.
-
-    A tile that gives F lumen in all, Lambertian, gives F / pi cos cos' / r^2 at a distance r.
-    """
-    tiles = zip(*lamps.tiles(), strict=True)
-    light = (tile_irradiance(lamps, middle, way)(points, normals) for middle, way in tiles)
-    return np.asarray(sum(light, np.zeros(len(points))))
-
-
-def tile_irradiance(
-    lamps: RectangularLamps, middle: Floats, way: Floats
-) -> Callable[[Floats, Floats], Floats]:
-    """The irradiance by one tile, in its middle (3,) and facing a direction (3,)."""
-    count = len(lamps.places)
-    flux = lamps.lumen * count / (count * math.prod(TILES))
-
-    def light(points: Floats, normals: Floats) -> Floats:
-        toward = middle - points
-        distance = norm(toward)
-        leaves = np.maximum(-(toward @ way), 0) / distance
-        meets = np.maximum((toward * normals).sum(axis=1), 0) / distance
-        return np.asarray(1e6 * flux / np.pi * leaves * meets / distance**2)
-
-    return light
 
 
 def lit_by(lamps: RectangularLamps, subject: SceneObject) -> SceneObject:

@@ -41,6 +41,8 @@ class Scene:
     lamps: PointLights | None = None
     # highlights of lamps in the object's microfacets, besides; None: it is matt
     microfacets: Gloss | None = None
+    # facets of black bodies before it, as an Embree scene; None: nothing is before it
+    screen: Any | None = None
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,18 @@ def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
         colour[hits.rows] = np.minimum(colour[hits.rows] + 255 * glint[:, None], 255)
     if scene.microfacets is not None:
         colour[hits.rows] += 255 * hits.highlights(scene.subject, scene.microfacets)[:, None]
+    if scene.screen is not None and len(origin):
+        _put_before(scene.screen, origin, direction, colour, depth)
     return RayHits(colour, depth)
+
+
+def _put_before(
+    screen: Any, origin: Floats, direction: Floats, colour: Colours, depth: Floats
+) -> None:
+    """Make rays black, and as long, as the bodies that they meet before the object."""
+    hits = screen.run(origin.astype(np.float32), direction.astype(np.float32), output=1)
+    nearer = (hits["primID"] >= 0) & (hits["tfar"] < depth)
+    colour[nearer], depth[nearer] = BACKGROUND, hits["tfar"][nearer]
 
 
 def _light(scene: Scene, hits: SurfaceHits) -> Floats:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tbcad.core.optics.lamp_light import RectangularLamps
 from tbcad.core.optics.mirror_light import Lamps
 from tbcad.light.simulate.scene.cast_light import (
     Gloss,
@@ -16,7 +17,6 @@ from tbcad.light.simulate.scene.cast_light import (
     led_sources,
     open_share,
 )
-from tbcad.light.simulate.scene.lamps import RectangularLamps
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import (
     LAMP_LIGHT,

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.lamp_light import RectangularLamps, irradiance
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.lamps import RectangularLamps, irradiance, read_lamps
+from tbcad.light.simulate.scene.lamps import read_lamps
 from tests.exported_files import edit_json
 from tests.prototype_records import LAMP_SECTION, write_prototype
 

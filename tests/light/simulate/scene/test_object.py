@@ -8,9 +8,10 @@ import trimesh
 from PIL import Image
 
 from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.optics.lamp_light import RectangularLamps
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.light.simulate.capture.files import read_object, write_object
-from tbcad.light.simulate.scene.lamps import PointLights, RectangularLamps, lit_by
+from tbcad.light.simulate.scene.lamps import PointLights, lit_by
 from tbcad.light.simulate.scene.object import SceneObject, built_in_object, pattern
 from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.light.simulate.scene.ray_casting import (

@@ -62,6 +62,7 @@ def checks(
     if lamps.strip not in STRIPS:
         raise Unknown(f"{lamps.strip} is no strip that is known")
     own = {lamp.name for lamp in lamps.places}
+    own |= {name for led in (lamps.upper.leds if lamps.upper else []) for name in led.names[:1]}
     in_the_way = bodies.without(stage_bodies(context) | own)
     points, normals = _surfaces(context)
     fields = np.stack(
@@ -200,6 +201,15 @@ def irradiance(
             free = ~bodies.blocked(np.broadcast_to(tile, places.shape), places, angle)
             flux = 1e6 * exitance * area / np.pi * leaves / distance**2 * free
             total += flux[index] * np.maximum((normals * way[index]).sum(axis=1), 0)
+    upper = lamps.upper
+    for led in upper.leds if upper else []:
+        way = led.position - places
+        distance = np.linalg.norm(way, axis=1)
+        way /= distance[:, None]
+        leaves = np.maximum(-way @ led.direction, 0)
+        free = ~bodies.blocked(np.broadcast_to(led.position, places.shape), places, angle)
+        flux = 1e6 * (upper.candela if upper else 0.0) * leaves / distance**2 * free
+        total += flux[index] * np.maximum((normals * way[index]).sum(axis=1), 0)
     return total
 
 
