@@ -53,7 +53,8 @@ def test_mirrors_of_every_design_see_the_capture_sphere(path: Path) -> None:
     spec = load_spec(path)
     least = designed(spec).arrays[0].coverage.min()
     assert spec.name == path.stem
-    assert least >= spec.optics.capture_diameter_mm
+    rounding = 1e-3 if spec.mirrors.margin_mm == 0 else 0  # of the search for radii
+    assert least >= spec.optics.capture_diameter_mm - rounding
     if path.stem == "mukaigawa-flat":  # as its comment says
         assert least == pytest.approx(21.1, abs=0.05)
 

@@ -323,9 +323,9 @@ class PrototypeSpec(Section):
     """Which ball a group gets. cover: the largest that shows the whole capture sphere for every
     mirror of the group; nearest: the one nearest to the mean radius of the group: more pixels,
     but pictures overlap."""
-    ball_margin_mm: float = Field(0.5, ge=0, le=20)
+    ball_margin_mm: float = Field(0.75, ge=0, le=20)
     """Coverage beyond the capture sphere that balls are chosen for, so that errors of a prototype
-    printed by FDM leave the whole of it after calibration; with snap cover. SLA needs 0.25."""
+    printed by FDM leave the whole of it after calibration; with snap cover."""
     picture: Picture = "moved"
     """What happens to a ball's picture when pictures are merged. moved: it is moved to its
     mirror's place; fixed: it stays, and balls must then be so small that few pixels remain,

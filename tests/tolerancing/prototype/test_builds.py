@@ -155,7 +155,7 @@ class TestCoverage:
         self, model: PrototypeWindows, layout: PrototypeLayout
     ) -> None:
         result, m = prototype_result(model, draws_of(model, 1)), len(layout.array)
-        assert result.coverage[0, :m] == pytest.approx(layout.fit.coverage, abs=1e-4)
+        assert result.coverage[0, :m] == pytest.approx(layout.fit.coverage, abs=5e-4)
         assert result.offset.max() < 1e-9
 
     def test_all_errors_together_against_the_slow_model(
