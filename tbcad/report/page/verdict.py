@@ -162,9 +162,9 @@ def _prototype(verdict: Verdict | None, as_made: AsMade | None, target_mm: float
         yield _yield_words(as_made.builds, target_mm)
         yield _yields([made])
     if parts and not failed:
-        yield f"<p>The printer of the design makes all {len(parts)} printed parts.</p>"
+        yield f"<p>All {len(parts)} parts can be made.</p>"
     for one in failed:
-        yield f"<p>Its printer cannot make {escape(one.file)}: {escape(one.detail)}.</p>"
+        yield f"<p>Cannot be made: {escape(one.file)}: {escape(one.detail)}.</p>"
     yield "</div>"
 
 

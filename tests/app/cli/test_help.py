@@ -125,7 +125,7 @@ def test_keys_sections_and_checks_by_all_their_names(cli: Command) -> None:
         "stage": {"term stage", "section prototype.stage"},
         "bolts": {"key shell.seam_flange.bolts", "key shell.foot_flange.bolts"},
         "coverage facets": {"check coverage, facets"},
-        "mirrors off": {"check centre error"},  # as the summary calls it
+        "mirror error": {"check centre error"},  # as the summary calls it
     }.items():
         assert found(cli, name).keys() == expected
     key = found(cli, "mirrors.margin_mm")["key mirrors.margin_mm"]

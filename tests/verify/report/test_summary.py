@@ -77,9 +77,7 @@ def test_pass_with_all_there_is(long_report: Report) -> None:
     assert len(lines) == MAX_LINES
     assert lines[0].endswith(", on 16 balls too")
     assert lines[1] == "Shells: good by diamond 98%"
-    assert lines[2] == (
-        "Prototype: 12/15 good, printed by FDM, calibrated; its printer makes all 2 parts"
-    )
+    assert lines[2] == "Prototype: 12/15 good, printed by FDM, calibrated; all 2 parts can be made"
     assert "50 simulated builds, or until 3 fail;" in lines[-7]  # 47 of 50 are 94 %
     assert lines[-6] == "  diamond 98% 60, cnc 7/10 60, sla 0/5 51.4; prototype 12/15 59.9"
     assert "9 questions to other programs skipped" in lines[-4]
@@ -100,7 +98,7 @@ def test_parts_that_the_printer_cannot_make_are_counted(long_report: Report) -> 
     files = {one.file for one in long_report.checks if one.name == "printable"}
     lines = fits(shown(broken(long_report, lambda check: check.file == "a.stl")))
     assert lines[0] == "Files: FAIL, failed: printable"
-    assert lines[2].endswith(f"; 1 of {len(files)} parts unprintable")
+    assert lines[2].endswith(f"; 1 of {len(files)} parts cannot be made")
 
 
 def test_no_process_and_no_simulation_are_said(long_report: Report) -> None:
@@ -112,7 +110,7 @@ def test_no_process_and_no_simulation_are_said(long_report: Report) -> None:
     ):
         lines = fits(shown(replace(long_report, as_made=made)))
         assert lines[1].startswith(f"Shells: {said}")
-        assert lines[2].startswith("Prototype: yield not simulated; its printer makes all")
+        assert lines[2].startswith("Prototype: yield not simulated; all")
 
 
 def test_every_key_figure_has_room(long_report: Report) -> None:

@@ -68,9 +68,9 @@ def shells_line(as_made: AsMade | None) -> str:
 
 def prototype_line(as_made: AsMade | None, parts: int, unprintable: int) -> str:
     """The yield of calibrated prototypes, and how many of its parts its printer cannot make."""
-    printer = f"its printer makes all {parts} parts"
+    printer = f"all {parts} parts can be made"
     if unprintable:
-        printer = f"{unprintable} of {parts} parts unprintable"
+        printer = f"{unprintable} of {parts} parts cannot be made"
     made = as_made.prototype if as_made else None
     if made is None:
         return f"Prototype: yield not simulated; {printer}"

@@ -119,12 +119,12 @@ KEY_FIGURES = (
     KeyFigure("light paths", "pixels blocked", ""),
     KeyFigure("light paths, balls", "rays blocked", ""),
     KeyFigure("object clearance", "clearance"),
-    KeyFigure("centre error", "mirrors off"),
-    KeyFigure("ball centres", "balls off"),
+    KeyFigure("centre error", "mirror error"),
+    KeyFigure("ball centres", "ball error"),
     KeyFigure("mandrel draft", "mandrel draft"),
     KeyFigure("mandrel reach", "mandrel reach"),
-    KeyFigure("step volume", "STEP volume off"),
-    KeyFigure("step area", "STEP area off"),
+    KeyFigure("step volume", "volume error"),
+    KeyFigure("step area", "area error"),
     KeyFigure("pixels, balls", "pixels kept", "%"),
 )
 
