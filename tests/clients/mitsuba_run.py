@@ -1,29 +1,29 @@
-"""A run of the prototype rendered by Mitsuba, written as a rig with a camera writes it.
+"""The light of a run of the prototype, rendered by Mitsuba; by hand, for it takes minutes.
 
-    python -m tests.clients.mitsuba_run BUILD RUN --seed 1 --stops 1,4,8
+    python -m tests.clients.mitsuba_run BUILD LIGHT.npz --seed 1 --stops 1,4,8
 
 Mitsuba finds what rays meet: spheres and bodies of caps as exact shapes, LEDs' domes, object and
 stage as meshes. Rays come from a pupil of finite width through a lens that distorts, are reflected
-up to three times, and are summed over pixels with lens blur, veil and a sensor's noise. No code is
-shared with tbcad.
+up to three times, and are summed over pixels with lens blur and veil. No code is shared with
+tbcad.
+
+It needs LLVM 16 or newer (DRJIT_LIBLLVM_PATH).
 """
 
 import argparse
-import hashlib
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 import trimesh
-from PIL import Image
 from scipy.ndimage import gaussian_filter
 
+from tests.clients.rendered_photographs import steps
 from tests.clients.rendered_rig import (
     DOME_MM,
     Rig,
@@ -31,13 +31,9 @@ from tests.clients.rendered_rig import (
     directions,
     form_slopes,
     projected,
-    rows,
     unit,
 )
 
-LIBRARIES = sorted(Path("/usr/lib").glob("*/libLLVM*1[5-9].so"))
-if LIBRARIES:  # with 14, which is found first where both are, Mitsuba's loops are not compiled
-    os.environ.setdefault("DRJIT_LIBLLVM_PATH", str(LIBRARIES[-1]))
 mi.set_variant("llvm_ad_rgb")
 import drjit as dr  # noqa: E402 - its backend follows from the variant
 
@@ -45,12 +41,8 @@ PUPIL_MM = 0.5  # radius of the pupil
 FINE, COARSE, WINDOW = 8, 2, 6  # rays across a pixel at highlights and elsewhere; half width, px
 LENS_PX, VEIL_PX, VEIL = 0.65, 4.0, 0.01  # blur of the lens, and of the share that is scattered
 LED_LIGHT, REFLECTANCE, BOUNCES = 1.3, 0.9, 3  # of a full pixel; of a mirror
-FULL, READ, ROW, PRNU, PEDESTAL = 6000.0, 6.0, 1.5, 0.008, 4.0  # electrons, and of 255
 OFF_MM = 1e-3
 NOTHING, BALL, BODY, DOME, MATT = range(5)
-DEPENDS_ON = ("design.json", "mirrors.csv", "prototype.json", "balls.csv", "rotation_plan.csv")
-BY_WEIGHT = ("stops.csv", "sag.csv")
-Frames = list[tuple[int, int]]
 
 
 @dataclass(frozen=True)
@@ -68,7 +60,7 @@ class Still:
     )
 
 
-def subject(radius: float = 13.0) -> trimesh.Trimesh:
+def subject(radius: float = 17.0) -> trimesh.Trimesh:
     """A ball with bumps of no symmetry."""
     mesh = trimesh.creation.icosphere(subdivisions=5, radius=1.0)
     x, y, z = mesh.vertices.T
@@ -151,7 +143,7 @@ def staged(rig: Rig, still: Still, frame: int) -> Stage:
 def met(scene: Any, start: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, ...]:
     """Numbers of shapes, points and normals that rays (n, 3) meet first; shape 0 for none."""
     ray = mi.Ray3f(mi.Point3f(*start.T), mi.Vector3f(*way.T))
-    found = scene.ray_intersect(ray)
+    found = scene.ray_intersect(ray, mi.RayFlags.Minimal, True)
     shape = np.array(dr.reinterpret_array(mi.UInt32, found.shape))
     return shape, start + np.array(found.t, float)[:, None] * way, np.array(found.n, float).T
 
@@ -335,75 +327,20 @@ def highlights(stage: Stage) -> Iterator[tuple[int, int, np.ndarray]]:
                     yield led, ball, pixel
 
 
-def recorded(light: np.ndarray, gain: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Numbers (h, w, 3) of a photograph of light (h, w, 3): shot, read and row noise, 8 bits."""
-    electrons = random.poisson(FULL * np.maximum(light, 0) * gain[..., None]).astype(float)
-    electrons += READ * random.standard_normal(light.shape)
-    electrons += ROW * random.standard_normal((len(light), 1, 1))
-    return np.clip(np.rint(PEDESTAL + 255 * electrons / FULL), 0, 255).astype(np.uint8)
-
-
-def render_run(
-    build: Path, out: Path, seed: int, stops: list[int], lit: bool = True
-) -> tuple[Rig, Frames]:
-    """Photograph stops of a build in both runs, and write the run's folder; what was there."""
+def render(build: Path, out: Path, seed: int, stops: list[int], lit: bool = True) -> None:
+    """Write the light of all photographs of some stops of a build, in both runs."""
     frames = [(turn, stop) for turn in (0, 180) for stop in stops]
-    rig = built(build, frames, seed)
-    random = np.random.default_rng([41, seed])
-    gain = 1 + PRNU * random.standard_normal(rig.size[::-1])
+    rig, random = built(build, frames, seed), np.random.default_rng([41, seed])
     focus = json.loads((build / "camera.json").read_text())["requirements"]["focus_mm"]
-    phases = ["dark", *(f"led_{led}" for led in range(1, len(rig.leds) + 1)), *["lit"] * lit]
-    images = out / "photographs"
-    images.mkdir(parents=True)
-    still = {turn: still_life(build, out, turn > 0) for turn in (0, 180)}
-    angles = [float(row["base_angle_deg"]) for row in rows(build / "stops.csv")]
-    told = [
-        {"object_turn_deg": turn, "stop": stop, "base_angle_deg": angles[stop - 1]}
-        for turn, stop in frames
-    ]
-    for number, (turn, _) in enumerate(frames):
-        seen = pictures(staged(rig, still[turn], number), focus, random, lit)
-        dark = np.zeros((*rig.size[::-1], 3))
-        light = [dark, *(np.repeat(one[..., None], 3, axis=2) for one in seen.leds), seen.lit]
-        for phase, one in zip(phases, light, strict=False):
-            _write(images, told[number], phase, recorded(one, gain, random))
-    for path in out.glob("*.ply"):
-        path.unlink()
-    files = [*DEPENDS_ON, *BY_WEIGHT]
-    record = {
-        "schema": "tbcad-run/1",
-        "export_sha256": {n: hashlib.sha256((build / n).read_bytes()).hexdigest() for n in files},
-        "source": "camera",
-        "camera": "rendered",
-        "width_px": rig.size[0],
-        "height_px": rig.size[1],
-        "phases": phases,
-        "frames": told,
-        "locked": {},
-        "seconds": float(len(frames) * len(phases)),
-    }
-    (out / "run.json").write_text(json.dumps(record, indent=1))
-    return rig, frames
-
-
-def _write(folder: Path, frame: dict[str, Any], phase: str, image: np.ndarray) -> None:
-    name = f"{'b' if frame['object_turn_deg'] else 'a'}_{frame['stop']:04d}_{phase}"
-    file = BytesIO()
-    Image.fromarray(image).save(file, "png", compress_level=1)
-    (folder / f"{name}.png").write_bytes(file.getvalue())
-    sidecar = {
-        "schema": "tbcad-exposure/1",
-        "frame": frame,
-        "phase": phase,
-        "file": f"{name}.png",
-        "sha256": hashlib.sha256(file.getvalue()).hexdigest(),
-        "width_px": image.shape[1],
-        "height_px": image.shape[0],
-        "exposure_s": 1.0,
-        "taken": "2026-01-01T00:00:00Z",
-        "settings": {},
-    }
-    (folder / f"{name}.json").write_text(json.dumps(sidecar, indent=1))
+    with TemporaryDirectory() as folder:
+        still = {turn: still_life(build, Path(folder), turn > 0) for turn in (0, 180)}
+        seen = [
+            pictures(staged(rig, still[turn], number), focus, random, lit)
+            for number, (turn, _) in enumerate(frames)
+        ]
+    leds = steps(np.array([one.leds for one in seen]))
+    more = {"lit": steps(np.array([one.lit for one in seen]))} if lit else {}
+    np.savez_compressed(out, seed=seed, frames=np.array(frames), leds=leds, **more)
 
 
 if __name__ == "__main__":
@@ -415,4 +352,4 @@ if __name__ == "__main__":
     parser.add_argument("--no-lit", action="store_true")
     asked = parser.parse_args()
     stops = [int(one) for one in asked.stops.split(",")]
-    render_run(asked.build, asked.out, asked.seed, stops, not asked.no_lit)
+    render(asked.build, asked.out, asked.seed, stops, not asked.no_lit)

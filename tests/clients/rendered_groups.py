@@ -1,0 +1,92 @@
+"""A calibrated machine against the rig that was rendered: errors by group, and their chi-squares."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tbcad.core.optics.camera import LensCamera
+from tbcad.core.optics.sphere_forms import Forms
+from tbcad.rig.calibration.calibrate import MachineCalibration
+from tbcad.rig.calibration.report.recovered import ray_errors, recovered_errors
+from tbcad.rig.machine.designed import sag_motion
+from tbcad.rig.machine.machine import Machine
+from tests.clients.rendered_rig import Rig
+
+
+@dataclass(frozen=True)
+class Group:
+    """Figures of one kind: root mean squares of what was injected, of the error, of sigma."""
+
+    name: str
+    unit: str
+    count: int
+    injected: float
+    error: float
+    stated: float
+    chi_square: float  # mean square of the errors in standard deviations
+
+
+def true_machine(rig: Rig) -> Machine:
+    """The rig as tbcad describes a machine."""
+    return Machine(
+        camera=LensCamera(
+            rig.pinhole, rig.axes, rig.focal, rig.principal, np.append(rig.lens, 0), *rig.size
+        ),
+        axis=rig.axis,
+        axis_point=rig.point,
+        angle=rig.angle,
+        centre=rig.centre,
+        radius=rig.radius,
+        leds=rig.leds,
+        turn=rig.turn,
+        shift=rig.shift,
+        sag=rig.sag,
+        forms=Forms(rig.terms, rig.across, rig.half),
+    )
+
+
+def apart(truth: Machine) -> Machine:
+    """The same with what weight does told as a calibration does: motion, and change of shape."""
+    moved = sag_motion(truth, truth.sag)
+    turn, shift = truth.turn + moved.turn, truth.shift + moved.shift
+    return replace(truth, angle=truth.angle + moved.angle, turn=turn, shift=shift, sag=moved.sag)
+
+
+def groups(result: MachineCalibration, rig: Rig) -> tuple[Group, ...]:
+    """All groups of a calibration."""
+    truth = true_machine(rig)
+    kinds = [kind for kind in recovered_errors(result, truth) if kind.name != "base angles"]
+    kinds += [kind for kind in recovered_errors(result, apart(truth)) if kind.name == "base angles"]
+    found = [
+        _group(one.name, one.unit, one.injected, one.recovered - one.injected, one.sigma)
+        for one in kinds
+    ]
+    known = result.rays.known
+    every = ray_errors(result.found, truth, known.frame, known.sphere)
+    for name, errors, of in zip(
+        ("rays", "rays of one run"), every, (known.relative, known.in_run), strict=True
+    ):
+        sigma = np.sqrt(np.diagonal(of.covariance, axis1=1, axis2=2))
+        for what, unit, some, factor in (
+            ("place", "um", np.s_[:, :2], 1e3),
+            ("direction", "mrad", np.s_[:, 2:], 1e3),
+        ):
+            figures = factor * errors[some].ravel(), factor * sigma[some].ravel()
+            found.append(_group(f"{name}, {what}", unit, np.full(1, np.nan), *figures))
+    return tuple(found)
+
+
+def _group(
+    name: str, unit: str, injected: np.ndarray, error: np.ndarray, sigma: np.ndarray
+) -> Group:
+    size = (float(np.sqrt(np.mean(one**2))) for one in (injected, error, sigma))
+    return Group(name, unit, len(error), *size, float(np.mean((error / sigma) ** 2)))
+
+
+def table(found: tuple[Group, ...]) -> str:
+    """Rows of a table in Markdown."""
+    return "\n".join(
+        f"| {one.name}, {one.unit} | {one.count} | {one.injected:.3g} | {one.error:.3g} | "
+        f"{one.stated:.3g} | {one.chi_square:.2f} |"
+        for one in found
+    )
