@@ -42,6 +42,7 @@ FINE, COARSE, WINDOW = 8, 2, 6  # rays across a pixel at highlights and elsewher
 LENS_PX, VEIL_PX, VEIL = 0.65, 4.0, 0.01  # blur of the lens, and of the share that is scattered
 LED_LIGHT, REFLECTANCE, BOUNCES = 1.3, 0.9, 3  # of a full pixel; of a mirror
 OFF_MM = 1e-3
+VIEW, VIEW_SIZE, MARGIN = (20.0, 45.0), (320, 240), 1.05  # degrees; pixels; room round the object
 NOTHING, BALL, BODY, DOME, MATT = range(5)
 
 
@@ -95,7 +96,8 @@ def still_life(build: Path, folder: Path, turned: bool) -> Still:
             solid = trimesh.Trimesh(solid.vertices, solid.faces)
             solid.vertices = (solid.vertices - part["origin_mm"]) @ np.array(part["axes"]).T
             shapes[f"stage_{part['name']}"] = mesh_shape(solid, folder, part["name"])
-    return Still(shapes, mi.load_dict({"type": "scene", **shapes}), flip)
+    named = {name: shape | {"id": name} for name, shape in shapes.items()}
+    return Still(shapes, mi.load_dict({"type": "scene", **named}), flip)
 
 
 @dataclass(frozen=True)
@@ -264,13 +266,13 @@ def pictures(stage: Stage, focus: float, random: np.random.Generator, lit: bool)
     end = traced(stage, *pupil_rays(rig, shaken.reshape(-1, 2), focus, random))
     led_of, ball_of = (np.repeat(one, near.shape[1]) for one in (led, ball))
     own = (end.kind == DOME) & (end.owner == led_of) & (end.first == ball_of) & (end.bounces == 1)
-    for led, first, shown in zip(led, corner, own.reshape(len(near), -1), strict=True):
+    for number, first, shown in zip(led, corner, own.reshape(len(near), -1), strict=True):
         light = LED_LIGHT * REFLECTANCE * shown.reshape(side * FINE, side * FINE)
         low, high = np.maximum(first, 0), np.minimum(first + side, [w, h])
         if (low >= high).any():
             continue
         here = np.s_[low[1] - first[1] : high[1] - first[1], low[0] - first[0] : high[0] - first[0]]
-        leds.leds[led, low[1] : high[1], low[0] : high[0]] += blurred(light, FINE)[here]
+        leds.leds[number, low[1] : high[1], low[0] : high[0]] += blurred(light, FINE)[here]
     cosine = directions(rig, grid(np.zeros(2), (w, h), 1).reshape(-1, 2)) @ rig.axes[2]
     falls = (cosine**4).reshape(h, w)
     veiled = [(1 - VEIL) * one + VEIL * gaussian_filter(one, VEIL_PX) for one in leds.leds]
@@ -322,9 +324,31 @@ def highlights(stage: Stage) -> Iterator[tuple[int, int, np.ndarray]]:
             step = np.where(rig.radius > 500, 0.02, 0.2)[:, None]
             normal = unit(normal + step * (toward - normal))
         for ball, pixel in enumerate(projected(rig, stage.centre + rig.radius[:, None] * normal)):
-            if (np.abs(pixel) < 1e4).all() and (pixel > -WINDOW).all():
-                if (pixel < np.array(rig.size) + WINDOW).all():
-                    yield led, ball, pixel
+            if ((pixel > -WINDOW) & (pixel < np.array(rig.size) + WINDOW)).all():
+                yield led, ball, pixel
+
+
+def view(still: Still, azimuth: float, elevation: float, size: tuple[int, int]) -> np.ndarray:
+    """The object from a distance of 640 mm at angles in degrees, without balls, (h, w, 3).
+
+    The capture sphere of 60 mm fills the shorter side but for 5 %, as in pictures of tbcad view.
+    """
+    turn, rise = np.radians([azimuth, elevation])
+    level = np.array([np.cos(turn), np.sin(turn), 0.0])
+    back = np.cos(rise) * level + [0, 0, np.sin(rise)]
+    right = np.array([-np.sin(turn), np.cos(turn), 0.0])
+    axes = np.stack([right, np.cross(-back, right)])
+    pixels = grid(np.zeros(2), size, 4)
+    half = MARGIN * np.tan(np.arcsin(30 / 640)) / min(size)
+    place = (2 * pixels.reshape(-1, 2) - (np.array(size) - 1)) * half
+    way = unit(place @ axes - back)
+    shape, point, normal = met(still.scene, np.broadcast_to(640 * back, way.shape), way)
+    number = np.array(dr.reinterpret_array(mi.UInt32, still.scene.shapes_dr()))
+    of_object = number[[one.id() for one in still.scene.shapes()].index("object")]
+    shows = np.flatnonzero(shape == of_object)
+    light = np.zeros((len(way), 3))
+    light[shows] = lit_object(still, point[shows], normal[shows])
+    return light.reshape(size[1], 4, size[0], 4, 3).mean(axis=(1, 3))
 
 
 def render(build: Path, out: Path, seed: int, stops: list[int], lit: bool = True) -> None:
@@ -338,8 +362,11 @@ def render(build: Path, out: Path, seed: int, stops: list[int], lit: bool = True
             pictures(staged(rig, still[turn], number), focus, random, lit)
             for number, (turn, _) in enumerate(frames)
         ]
+        shown = view(still[0], *VIEW, VIEW_SIZE)
     leds = steps(np.array([one.leds for one in seen]))
     more = {"lit": steps(np.array([one.lit for one in seen]))} if lit else {}
+    if lit:
+        more["view"] = steps(shown)
     np.savez_compressed(out, seed=seed, frames=np.array(frames), leds=leds, **more)
 
 

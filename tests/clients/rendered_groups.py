@@ -1,4 +1,4 @@
-"""A calibrated machine against the rig that was rendered: errors by group, and their chi-squares."""
+"""A calibrated machine against the rig that was rendered: errors by group, with chi-squares."""
 
 from dataclasses import dataclass, replace
 
