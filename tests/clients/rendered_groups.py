@@ -3,12 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.sphere_forms import Forms
 from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.report.recovered import ray_errors, recovered_errors
-from tbcad.rig.machine.designed import sag_motion
 from tbcad.rig.machine.machine import Machine
 from tests.clients.rendered_rig import Rig
 
@@ -27,39 +27,39 @@ class Group:
 
 
 def true_machine(rig: Rig) -> Machine:
-    """The rig as tbcad describes a machine."""
-    return Machine(
+    """The rig as tbcad describes a machine: what weight turns and shifts is of each frame."""
+    frames = range(len(rig.angle))
+    give = Rotation.from_rotvec(rig.give[:, 3:])
+    base = Rotation.from_rotvec(rig.angle[:, None] * rig.axis)
+    about = (base * give * base.inv()).as_rotvec() @ rig.axis
+    turned = Rotation.from_rotvec((rig.angle + about)[:, None] * rig.axis)
+    turn = Rotation.from_rotvec(rig.turn) * base * give * turned.inv()
+    bare = Machine(
         camera=LensCamera(
             rig.pinhole, rig.axes, rig.focal, rig.principal, np.append(rig.lens, 0), *rig.size
         ),
         axis=rig.axis,
         axis_point=rig.point,
-        angle=rig.angle,
+        angle=rig.angle + about,
         centre=rig.centre,
         radius=rig.radius,
         leds=rig.leds,
-        turn=rig.turn,
-        shift=rig.shift,
-        sag=rig.sag,
+        turn=turn.as_rotvec(),
+        shift=np.zeros((len(rig.angle), 3)),
+        sag=np.stack([give[f].inv().apply(rig.sag[f]) for f in frames]),
         forms=Forms(rig.terms, rig.across, rig.half),
     )
-
-
-def apart(truth: Machine) -> Machine:
-    """The same with what weight does told as a calibration does: motion, and change of shape."""
-    moved = sag_motion(truth, truth.sag)
-    turn, shift = truth.turn + moved.turn, truth.shift + moved.shift
-    return replace(truth, angle=truth.angle + moved.angle, turn=turn, shift=shift, sag=moved.sag)
+    first = 0 * np.arange(len(rig.angle))
+    placed = np.stack([rig.placed(f, rig.centre)[0] for f in frames])
+    return replace(bare, shift=placed - bare.centres(np.arange(len(first)), first))
 
 
 def groups(result: MachineCalibration, rig: Rig) -> tuple[Group, ...]:
     """All groups of a calibration."""
     truth = true_machine(rig)
-    kinds = [kind for kind in recovered_errors(result, truth) if kind.name != "base angles"]
-    kinds += [kind for kind in recovered_errors(result, apart(truth)) if kind.name == "base angles"]
     found = [
         _group(one.name, one.unit, one.injected, one.recovered - one.injected, one.sigma)
-        for one in kinds
+        for one in recovered_errors(result, truth)
     ]
     known = result.rays.known
     every = ray_errors(result.found, truth, known.frame, known.sphere)

@@ -40,7 +40,10 @@ class Rig:
     radius: np.ndarray
     body: np.ndarray  # centres of the spheres in the seats, (k, 3)
     body_radius: np.ndarray
-    sag: np.ndarray  # (f, k, 3)
+    # by weight, in the base's frame: shift and rotation vector of the whole, and how seats move
+    # beside that, (f, 6) and (f, k, 3)
+    give: np.ndarray
+    sag: np.ndarray
     half: np.ndarray  # half width of the part of a cap in use, 0 of balls, (k,)
     terms: np.ndarray  # (k, 7)
     across: np.ndarray  # x and y of the forms, (k, 2, 3)
@@ -49,13 +52,15 @@ class Rig:
     def placed(self, frame: int, points: np.ndarray) -> np.ndarray:
         """Points of the base (k, 3), one of each sphere, where they are in a frame."""
         about = Rotation.from_rotvec(self.angle[frame] * self.axis)
-        moved = self.point + about.apply(points + self.sag[frame] - self.point)
+        bent = Rotation.from_rotvec(self.give[frame, 3:]).apply(points) + self.give[frame, :3]
+        moved = self.point + about.apply(bent + self.sag[frame] - self.point)
         return Rotation.from_rotvec(self.turn[frame]).apply(moved) + self.shift[frame]
 
     def attitude(self, frame: int) -> Rotation:
         """Of the base in a frame."""
         about = Rotation.from_rotvec(self.angle[frame] * self.axis)
-        return Rotation.from_rotvec(self.turn[frame]) * about
+        give = Rotation.from_rotvec(self.give[frame, 3:])
+        return Rotation.from_rotvec(self.turn[frame]) * about * give
 
 
 def rows(path: Path) -> list[dict[str, str]]:
@@ -111,6 +116,7 @@ def designed(build: Path, frames: list[tuple[int, int]]) -> tuple[Rig, np.ndarra
         radius=radius,
         body=numbers(balls, "bx by bz"),
         body_radius=numbers(balls, "body_radius_mm")[:, 0],
+        give=np.zeros((len(frames), 6)),
         sag=np.zeros((len(frames), len(balls), 3)),
         half=half,
         terms=np.zeros((len(balls), TERMS)),
@@ -145,6 +151,7 @@ def built(build: Path, frames: list[tuple[int, int]], seed: int) -> Rig:
     moved = common + (growth - 1) * rig.body + SEAT * normal((count, 3))
     tilt = Rotation.from_rotvec(1.8e-3 * normal(2) @ across)
     share = 1 + 0.25 * normal(len(PARTS))  # each part bends by its own
+    give, sag = motion_and_rest(rig.body, np.tensordot(share, bent, 1))
     turn = 2.8e-4 * normal((every, 2)) @ across
     run_out = 0.01 * normal((every, 2)) @ across
     offset = np.radians(random.uniform(-zero_error, zero_error, 2))
@@ -170,11 +177,26 @@ def built(build: Path, frames: list[tuple[int, int]], seed: int) -> Rig:
         radius=powered + high,
         body=tilt.apply(rig.body + moved),
         body_radius=rig.body_radius + np.where(cap, 0.0, high),
-        sag=tilt.apply(np.tensordot(share, bent, 1).reshape(-1, 3)).reshape(rig.sag.shape),
+        give=give,
+        sag=sag,
         terms=1e-3 * FORM_UM * normal((count, TERMS)) * cap[:, None],
         across=np.stack([(tilt * tilted).apply(rig.across[:, i]) for i in (0, 1)], axis=1),
         leds=rig.leds + SHIFT * normal(3) + LED * normal(rig.leds.shape),
     )
+
+
+def motion_and_rest(place: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Displacements (f, k, 3) of bodies at places (k, 3) as shift and turn (f, 6), and the rest.
+
+    What head, shaft and uprights do is a motion of the whole base, and caps turn with it.
+    """
+    motion = np.zeros((len(place), 3, 6))
+    motion[:, :, :3] = np.eye(3)
+    motion[:, :, 3:] = np.cross(np.eye(3), place[:, None]).swapaxes(1, 2)
+    flat = motion.reshape(-1, 6)
+    give = np.linalg.lstsq(flat, moved.reshape(len(moved), -1).T, rcond=None)[0].T
+    turned = [Rotation.from_rotvec(one[3:]).apply(place) + one[:3] - place for one in give]
+    return give, moved - np.array(turned)
 
 
 def directions(rig: Rig, pixels: np.ndarray) -> np.ndarray:

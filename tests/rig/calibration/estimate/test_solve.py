@@ -219,7 +219,7 @@ def test_every_case_has_figures(export: ExportedDesign) -> None:
 
 
 def of_prototype(**known: Any) -> Prior:
-    still = [sag_motion(MACHINE, NONE)]
+    still = [sag_motion(MACHINE, MACHINE.centre, NONE)]
     return prototype_prior(MACHINE, still, ERRORS, ARMS, SERIES, 0.01, **known)
 
 
@@ -244,7 +244,7 @@ def test_weight_moves_frames_as_it_is_expected_to_and_by_as_much_as_that_may_be_
     """The motion and what is left put every ball where its weight does."""
     bends = 0.01 * np.random.default_rng(2).standard_normal((2, *NONE.shape))
     prior = prototype_prior(
-        MACHINE, [sag_motion(MACHINE, one) for one in bends], ERRORS, ARMS, SERIES
+        MACHINE, [sag_motion(MACHINE, MACHINE.centre, one) for one in bends], ERRORS, ARMS, SERIES
     )
     frame, sphere = np.repeat(np.arange(24), BALLS), np.tile(np.arange(BALLS), 24)
     moved = prior.mean.centres(frame, sphere) - MACHINE.centres(frame, sphere)
