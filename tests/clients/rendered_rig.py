@@ -14,8 +14,10 @@ from scipy.spatial.transform import Rotation
 
 PARTS = ("carrier", "head", "shaft", "uprights")  # that bend, in sag.csv
 TERMS = 7  # of a cap's form: astigmatism, coma, trefoil (sine and cosine each), spherical
-FORM_UM = np.array([2.0, 2.0, 0.7, 0.7, 0.7, 0.7, 0.7])  # printed and polished by hand
-SAGITTA_MM = 0.01  # likewise
+FORMS_UM = {  # by how caps are made, with the error of the sagitta first
+    "printed": np.array([10, 2.0, 2.0, 0.7, 0.7, 0.7, 0.7, 0.7]),
+    "turned": np.array([0.3, 0.1, 0.1, 0.03, 0.03, 0.05, 0.05, 0.05]),
+}
 SEAT, SHIFT, LED = 0.07, 0.15, 0.2  # of printed parts, and of an LED in its pocket
 LENS = np.array([0.03, 0.006, 7e-4, 7e-4])  # k1, k2, p1, p2
 DOME_MM = 1.5
@@ -93,8 +95,12 @@ def designed(build: Path, frames: list[tuple[int, int]]) -> tuple[Rig, np.ndarra
     focal = size[0] / 2 / np.tan(np.radians(design["hfov_deg"]) / 2)
     base = np.array([record["frame"][one] for one in ("axis", "zero", "third")])
     stop = np.array([stop - 1 for _, stop in frames])
+    angle = np.radians(numbers(stops, "base_angle_deg")[:, 0])
     bent = np.stack([numbers(weight, " ".join(f"{p}_{x}_mm" for x in "xyz")) for p in PARTS])
-    bent = bent.reshape(len(PARTS), len(stops), len(balls), 3) @ base
+    bent = bent.reshape(len(PARTS), len(stops), len(balls), 3)
+    for one, turned in enumerate(angle):  # the table is in the frame of the design
+        back = Rotation.from_rotvec(-turned * base[0]).as_matrix()
+        bent[:, one] = bent[:, one] @ back.T
     half = np.zeros(len(balls))
     for cap in record["caps"]:
         half[cap["ball"] - 1] = cap["aperture_mm"] / 2
@@ -109,7 +115,7 @@ def designed(build: Path, frames: list[tuple[int, int]]) -> tuple[Rig, np.ndarra
         lens=np.zeros(4),
         axis=base[0],
         point=np.zeros(3),
-        angle=np.radians(numbers(stops, "base_angle_deg")[stop, 0]),
+        angle=angle[stop],
         turn=still,
         shift=still,
         centre=numbers(balls, "cx cy cz") - numbers(balls, "sag_x_mm sag_y_mm sag_z_mm"),
@@ -136,9 +142,11 @@ def built(build: Path, frames: list[tuple[int, int]], seed: int) -> Rig:
     across = frame_axes(rig.axis[None])[0]
     cap = rig.half > 0
     outward = np.cross(rig.across[:, 0], rig.across[:, 1])
+    made = json.loads((build / "design.json").read_text())["spec"]["prototype"]["caps"]
+    power, *forms = 1e-3 * FORMS_UM[made]
     # Caps: power about the apex, height over the seat, tilt in the seat, form.
     designed_sagitta = rig.radius - np.sqrt(rig.radius**2 - rig.half**2)
-    sagitta = np.where(cap, designed_sagitta + SAGITTA_MM * normal(count), 1.0)
+    sagitta = np.where(cap, designed_sagitta + power * normal(count), 1.0)
     sagitta = np.maximum(sagitta, 0.05 * designed_sagitta)
     powered = np.where(cap, (rig.half**2 + sagitta**2) / (2 * sagitta), rig.radius)
     centre = rig.centre - (powered - rig.radius)[:, None] * outward
@@ -179,7 +187,7 @@ def built(build: Path, frames: list[tuple[int, int]], seed: int) -> Rig:
         body_radius=rig.body_radius + np.where(cap, 0.0, high),
         give=give,
         sag=sag,
-        terms=1e-3 * FORM_UM * normal((count, TERMS)) * cap[:, None],
+        terms=forms * normal((count, TERMS)) * cap[:, None],
         across=np.stack([(tilt * tilted).apply(rig.across[:, i]) for i in (0, 1)], axis=1),
         leds=rig.leds + SHIFT * normal(3) + LED * normal(rig.leds.shape),
     )

@@ -253,6 +253,19 @@ def test_weight_moves_frames_as_it_is_expected_to_and_by_as_much_as_that_may_be_
     assert prior.sigma[Block.SHIFT][0, 0] > of_prototype().sigma[Block.SHIFT][0, 0]
 
 
+def test_weight_turns_a_flat_cap_with_its_seat() -> None:
+    """The centre of its sphere, metres behind the seat, moves by as much as its arm is long."""
+    turn = np.array([1e-4, -2e-4, 3e-4])
+    far = replace(MACHINE, centre=MACHINE.centre + [3000.0, 0.0, 0.0])
+    moved = sag_motion(far, MACHINE.centre, np.cross(turn, MACHINE.centre) + NONE)
+    assert moved.sag == pytest.approx(0, abs=1e-9)
+    bent = replace(far, angle=far.angle + moved.angle, turn=moved.turn, shift=moved.shift)
+    frame, sphere = np.repeat(np.arange(24), BALLS), np.tile(np.arange(BALLS), 24)
+    found = bent.centres(frame, sphere) - far.centres(frame, sphere)
+    expected = rotated(np.cross(turn, far.centre)[sphere], MACHINE.axis, MACHINE.angle[frame])
+    assert found == pytest.approx(expected, abs=1e-3)
+
+
 def test_a_measured_radius_replaces_the_drawing() -> None:
     parsed = parse_measured(("1=43.2", "2 = 34.61:0.005"), 5)
     assert parsed == ((0, 43.2, MEASURED_MM), (1, 34.61, 0.005))
