@@ -90,3 +90,23 @@ def table(found: tuple[Group, ...]) -> str:
         f"{one.stated:.3g} | {one.chi_square:.2f} |"
         for one in found
     )
+
+
+POOLS = {
+    "spheres": ("centres", "radii"),
+    "forms of caps": ("forms",),
+    "base in its frames": ("base angles", "axis", "balls' middle"),
+    "camera and lens": ("camera's", "lens"),
+    "LEDs": ("LEDs",),
+    "rays": ("rays",),
+}
+"""Kinds of figures by what they are of, as names begin."""
+
+
+def pooled(found: tuple[Group, ...]) -> dict[str, float]:
+    """Chi-square of a figure in each of POOLS: figures of one kind share errors."""
+    pools = {name: [one for one in found if one.name.startswith(of)] for name, of in POOLS.items()}
+    return {
+        name: sum(one.count * one.chi_square for one in some) / sum(one.count for one in some)
+        for name, some in pools.items()
+    }
