@@ -256,7 +256,7 @@ def test_weight_moves_frames_as_it_is_expected_to_and_by_as_much_as_that_may_be_
 def test_weight_turns_a_flat_cap_with_its_seat() -> None:
     """The centre of its sphere, metres behind the seat, moves by as much as its arm is long."""
     turn = np.array([1e-4, -2e-4, 3e-4])
-    far = replace(MACHINE, centre=MACHINE.centre + [3000.0, 0.0, 0.0])
+    far = replace(MACHINE, centre=MACHINE.centre + 3000.0 * np.eye(3)[0])
     moved = sag_motion(far, MACHINE.centre, np.cross(turn, MACHINE.centre) + NONE)
     assert moved.sag == pytest.approx(0, abs=1e-9)
     bent = replace(far, angle=far.angle + moved.angle, turn=moved.turn, shift=moved.shift)
