@@ -81,6 +81,6 @@ def small_run(
     )
     series = np.array([frame.object_turn_deg // 180 for frame in frames])
     machine = designed.of_frames(kept)
-    still = [sag_motion(machine, np.zeros((len(kept), len(plan), 3)))]
+    still = [sag_motion(machine, plan.body_centre, np.zeros((len(kept), len(plan), 3)))]
     arm = np.where(is_cap(plan), norm(plan.centre - plan.body_centre), 0.0)
     return Small(run, prototype_prior(machine, still, kinds, arm, series))

@@ -69,7 +69,7 @@ class Setup:
         turned = replace(self.designed, angle=self.designed.angle + gravity.wind_up[stop])
         return prototype_prior(
             turned,
-            [sag_motion(turned, one[stop]) for one in gravity.sag],
+            [sag_motion(turned, self.plan.body_centre, one[stop]) for one in gravity.sag],
             errors,
             np.where(is_cap(self.plan), norm(self.plan.centre - self.plan.body_centre), 0.0),
             np.array([int(frame.object_turn_deg != 0) for frame in self.frames]),

@@ -184,4 +184,5 @@ def ray_directions(machine: Machine, frame: Ints, sphere: Ints) -> Floats:
 
 
 def _root(covariance_of_two: Floats) -> Floats:
-    return np.asarray(np.sqrt(np.trace(covariance_of_two, axis1=1, axis2=2)))
+    # What a motion fits wholly, as of the rays of one stop, is zero but for rounding.
+    return np.asarray(np.sqrt(np.maximum(np.trace(covariance_of_two, axis1=1, axis2=2), 0)))

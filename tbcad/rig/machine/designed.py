@@ -192,12 +192,13 @@ class Motion:
     sag: Floats  # mm, (f, k, 3)
 
 
-def sag_motion(machine: Machine, sag: Floats) -> Motion:
-    """Displacements of balls in the base's frame, mm, (f, k, 3), as the best motion and the rest.
+def sag_motion(machine: Machine, body: Floats, sag: Floats) -> Motion:
+    """Displacements of bodies in the base's frame, mm, (f, k, 3), as the best motion and the rest.
 
-    To first order, for an axis through the origin.
+    To first order, for an axis through the origin. Bodies are at (k, 3), mm: the centre of a flat
+    cap's sphere is metres behind its body, and moves with the turn as far as its arm is long.
     """
-    rigid = rigid_motion(machine.centre).reshape(-1, 6)
+    rigid = rigid_motion(body).reshape(-1, 6)
     fitted = sag.reshape(len(sag), -1) @ np.linalg.pinv(rigid).T
     rest = sag - (fitted @ rigid.T).reshape(sag.shape)
     shift, turn = (
@@ -212,7 +213,9 @@ def random_build(
 ) -> BuiltPrototype:
     """The first simulated build, the same that `tbcad tolerance` has, with a real lens and LEDs."""
     draws = draw_prototypes(errors, seed, [0], is_cap(plan), gravity)
-    moved = sag_motion(designed, np.tile(gravity.sagged(draws.sag[0]), (RUNS, 1, 1)))
+    moved = sag_motion(
+        designed, plan.body_centre, np.tile(gravity.sagged(draws.sag[0]), (RUNS, 1, 1))
+    )
     across = plan.frame[1:]
     other = draw_other_errors(len(designed.leds), seed)
     tilt = Rotation.from_rotvec(draws.tilt[0] @ across)

@@ -48,7 +48,9 @@ def small_prior(machine: Machine, process: str = "fdm") -> Prior:
     series = np.repeat([0, 1], len(machine.angle) // 2)
     down = np.stack([np.cos(machine.angle), np.sin(machine.angle)], axis=1)
     bends = np.random.default_rng(0).normal(0, 0.4, (2, len(arm), 3, 2))
-    moved = [sag_motion(machine, np.einsum("kxa,fa->fkx", one, down)) for one in bends]
+    moved = [
+        sag_motion(machine, machine.centre, np.einsum("kxa,fa->fkx", one, down)) for one in bends
+    ]
     return prototype_prior(machine, moved, process_errors(load_process(process)), arm, series)
 
 

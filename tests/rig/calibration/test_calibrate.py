@@ -53,6 +53,7 @@ from tbcad.rig.calibration.report.recovered import (
 from tbcad.rig.calibration.report.verdict import Answer, verdict, verdict_text
 from tbcad.rig.calibration.run import write_calibration
 from tbcad.rig.calibration.study import whole_errors
+from tbcad.rig.calibration.uncertainty import RayCovariance
 from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.rig.machine.machine import TRUTH, Highlights, read_machine, write_machine
 from tests.photographed_runs import write_run
@@ -116,6 +117,13 @@ def test_errors_of_rays_are_those_predicted(
     ):
         for off, sigma in ((place_mm(found), place), (turn_mrad(found), turn)):
             assert np.sqrt((off**2).mean()) < 3 * np.sqrt((sigma**2).mean())
+
+
+def test_rays_that_a_motion_fits_wholly_have_no_error() -> None:
+    """Those of one stop are so few: their variances are zero but for rounding, of either sign."""
+    rays = RayCovariance(np.diag([-1e-20, 1e-21, -1e-22, 0.0])[None])
+    assert rays.place_mm == pytest.approx([0.0], abs=1e-12)
+    assert rays.turn_mrad.tolist() == [0.0]
 
 
 @pytest.mark.slow

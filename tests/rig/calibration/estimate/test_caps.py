@@ -101,7 +101,7 @@ def test_errors_are_as_large_as_the_covariance_says(prior: Prior) -> None:
 
 def test_a_measured_radius_is_one_of_the_cap_about_its_apex() -> None:
     machine, errors = capped_machine(), process_errors(load_process("fdm"))
-    none = [sag_motion(machine, np.zeros((len(machine.angle), len(HALF), 3)))]
+    none = [sag_motion(machine, machine.centre, np.zeros((len(machine.angle), len(HALF), 3)))]
     series = np.zeros(len(machine.angle), dtype=np.int64)
     arms = np.where(HALF > 0, 8.0, 0.0)
 

@@ -219,7 +219,7 @@ def test_every_case_has_figures(export: ExportedDesign) -> None:
 
 
 def of_prototype(**known: Any) -> Prior:
-    still = [sag_motion(MACHINE, NONE)]
+    still = [sag_motion(MACHINE, MACHINE.centre, NONE)]
     return prototype_prior(MACHINE, still, ERRORS, ARMS, SERIES, 0.01, **known)
 
 
@@ -244,13 +244,26 @@ def test_weight_moves_frames_as_it_is_expected_to_and_by_as_much_as_that_may_be_
     """The motion and what is left put every ball where its weight does."""
     bends = 0.01 * np.random.default_rng(2).standard_normal((2, *NONE.shape))
     prior = prototype_prior(
-        MACHINE, [sag_motion(MACHINE, one) for one in bends], ERRORS, ARMS, SERIES
+        MACHINE, [sag_motion(MACHINE, MACHINE.centre, one) for one in bends], ERRORS, ARMS, SERIES
     )
     frame, sphere = np.repeat(np.arange(24), BALLS), np.tile(np.arange(BALLS), 24)
     moved = prior.mean.centres(frame, sphere) - MACHINE.centres(frame, sphere)
     expected = rotated(bends.sum(axis=0)[frame, sphere], MACHINE.axis, MACHINE.angle[frame])
     assert moved == pytest.approx(expected, abs=3e-5)  # turns of 0.5 mrad to first order
     assert prior.sigma[Block.SHIFT][0, 0] > of_prototype().sigma[Block.SHIFT][0, 0]
+
+
+def test_weight_turns_a_flat_cap_with_its_seat() -> None:
+    """The centre of its sphere, metres behind the seat, moves by as much as its arm is long."""
+    turn = np.array([1e-4, -2e-4, 3e-4])
+    far = replace(MACHINE, centre=MACHINE.centre + 3000.0 * np.eye(3)[0])
+    moved = sag_motion(far, MACHINE.centre, np.cross(turn, MACHINE.centre) + NONE)
+    assert moved.sag == pytest.approx(0, abs=1e-9)
+    bent = replace(far, angle=far.angle + moved.angle, turn=moved.turn, shift=moved.shift)
+    frame, sphere = np.repeat(np.arange(24), BALLS), np.tile(np.arange(BALLS), 24)
+    found = bent.centres(frame, sphere) - far.centres(frame, sphere)
+    expected = rotated(np.cross(turn, far.centre)[sphere], MACHINE.axis, MACHINE.angle[frame])
+    assert found == pytest.approx(expected, abs=1e-3)
 
 
 def test_a_measured_radius_replaces_the_drawing() -> None:
