@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 
 import typer
 
+from tbcad.app.cli.help_texts import PlainGroup
 from tbcad.common.screen import paragraph, report_console, stages
 from tbcad.common.told import told
 from tbcad.errors import InputError
@@ -28,12 +29,12 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="tbcad",
+    cls=PlainGroup,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Mirror arrays for light-field cameras: from the optical design to parts that can be "
-    "made, verified on the files written. Start with **tbcad build --out exports**.",
+    "made, verified on the files written. Start with tbcad build --out exports.",
 )
 HEAD_COLUMNS = 18
 Told = TypeVar("Told", bound=Callable[..., int])

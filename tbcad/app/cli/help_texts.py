@@ -6,9 +6,10 @@ from importlib.resources import files
 from typing import Any
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 from typer.models import CommandInfo
 
+LINE = 99  # characters of a command's first line, at most
 HEADINGS = {
     "Design and build": (
         *("init", "optimize", "build", "verify", "report", "picture", "camera"),
@@ -29,13 +30,8 @@ def examples() -> dict[str, dict[str, str]]:
 
 
 def order_help(app: typer.Typer) -> None:
-    """Put every command under its heading; one without a heading is a fault of tbcad."""
-    heading = {name: title for title, names in HEADINGS.items() for name in names}
-    place = list(heading)
-    for command in app.registered_commands:
-        command.rich_help_panel = heading[_name(command)]
-    for group in app.registered_groups:
-        group.rich_help_panel = heading[str(group.name)]
+    """Put commands in the order of the work; one without a heading is a fault of tbcad."""
+    place = [name for names in HEADINGS.values() for name in names]
     app.registered_commands.sort(key=lambda one: place.index(_name(one)))
 
 
@@ -44,6 +40,22 @@ def _name(command: CommandInfo) -> str:
 
 
 RENAMED_OPTIONS = {"--for-process": "--process", "--chain": "--process"}  # as they were, and are
+
+
+class PlainGroup(TyperGroup):
+    """All commands under their headings, in plain text."""
+
+    def __init__(self, *arguments: Any, **given: Any) -> None:
+        """As TyperGroup, but without markup."""
+        super().__init__(*arguments, **{**given, "rich_markup_mode": None})
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write a section for each heading."""
+        for title, names in HEADINGS.items():
+            with formatter.section(title):
+                found = [(name, self.get_command(ctx, name)) for name in names]
+                rows = [(name, one.get_short_help_str(LINE)) for name, one in found if one]
+                formatter.write_dl(rows)
 
 
 class Plain(TyperCommand):

@@ -59,8 +59,9 @@ def test_screen_shows_every_word_and_the_examples(
 
 def test_commands_are_under_headings_in_the_order_of_the_work(cli: Command) -> None:
     shown = cli("--help").out
-    places = [shown.index(f"─ {title} ─") for title in HEADINGS]
+    places = [shown.index(f"\n{title}:\n") for title in HEADINGS]
     assert places == sorted(places)
+    assert "<bool>" not in shown
     assert {name for names in HEADINGS.values() for name in names} == {
         words[0] for words in ALL if words
     }
