@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 study = typer.Typer(
     no_args_is_help=True,
-    rich_markup_mode="markdown",
+    rich_markup_mode=None,
     help="Reproduce a study of the paper: tables, notes and a plot, next to the paper's figures.",
 )
 app.add_typer(study, name="study")
