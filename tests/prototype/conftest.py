@@ -20,7 +20,7 @@ HEAVY = "prototype.largest_ball_mm=60", "prototype.grade=G40"
 SMALL = load_spec(
     None,
     [
-        *("n=6", "prototype.k=4", "prototype.base.hub_boss_mm=35"),
+        *("n=6", "prototype.k=4", "prototype.ball_margin_mm=0", "prototype.base.hub_boss_mm=35"),
         *("prototype.frame.clearance_mm=1.5", *HEAVY),
     ],
 )

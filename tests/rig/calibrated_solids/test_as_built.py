@@ -28,7 +28,7 @@ from tbcad.rig.machine.machine import Machine, write_machine
 from tests.exported_files import read_csv
 from tests.machine_states import frames_of, machine_of, perturbed
 
-CENTRE = re.compile(r"CARTESIAN_POINT\('',\(([^)]*)\)\)")
+CENTRE = re.compile(r"CARTESIAN_POINT\('',\(([^)]*)\) *\)")
 SPHERE = re.compile(r"SPHERICAL_SURFACE\('',#\d+,([0-9.E+-]+)\)")
 
 

@@ -114,7 +114,7 @@ def test_options_choose_stops_and_phases(export_with_wind_up: Path) -> None:
 
 def test_exposures_and_brightness(export_with_wind_up: Path, tmp_path: Path) -> None:
     """A dark photograph for each exposure; sidecars say it; a bright LED takes a short one."""
-    usual = {"stops": "20", "phases": "dark,led_1,lit"}
+    usual = {"stops": "30", "phases": "dark,led_1,lit"}
     bright = {"led_brightness": 100.0, "exposure_leds": 0.01, "exposure_lit": "1/2"}
     folders = [tmp_path / name for name in ("usual", "bright")]
     for folder, options in zip(folders, (usual, usual | bright), strict=True):
@@ -127,7 +127,7 @@ def test_exposures_and_brightness(export_with_wind_up: Path, tmp_path: Path) -> 
     images = [
         read_photograph(run, run.exposures[name]).astype(int)
         for run in (before, after)
-        for name in ("a_0020_led_1", "a_0020_lit")
+        for name in ("a_0030_led_1", "a_0030_lit")
     ]
     led, lit, same, darker = images
     assert np.abs(led - same).max() < 20  # noise
