@@ -67,7 +67,9 @@ class TestSeats:
     ) -> None:
         assert insertion_clearance(base.seats).min() > OFF_PATH_MM
         assert not thin_rims(base.seats).any()
-        ten = prototype_layout(load_spec(None, ["prototype.k=10", "prototype.ball_margin_mm=0", *HEAVY]), paper_design)
+        ten = prototype_layout(
+            load_spec(None, ["prototype.k=10", "prototype.ball_margin_mm=0", *HEAVY]), paper_design
+        )
         seats = seat_layout(SPEC, ten)
         cosine = -dot(seats.insertion, seats.axis) / norm(seats.insertion)
         assert 5 < np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 31
