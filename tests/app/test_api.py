@@ -80,7 +80,7 @@ def test_example_of_the_readme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     result, field = names["result"], names["field"]
     assert isinstance(result, tbcad.Build)
     assert result.passed
-    assert (tmp_path / "exports" / "shell_a.step").is_file()
+    assert (tmp_path / "small" / "shell_a.step").is_file()
     assert isinstance(field, tbcad.LightField)
     spec = tbcad.load_spec(None)
     for value in (spec, names["design"], names["array"], result, result.report, field):
