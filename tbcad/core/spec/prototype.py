@@ -242,9 +242,9 @@ class LightSpec(Section):
     segments: int = Field(1, ge=1, le=6)
     """Segments that each strip has, of 50 mm; of 25 mm where level strips of 50 have no room."""
     upper: Annotated[bool, OR_AUTO] = False
-    """Two LEDs on thin tubes above the object's sides, which light what faces up; they hide some
-    3 % of the pixels, which a merge leaves out. auto: where they fit; true: or the design is
-    refused; false: what faces up stays dark."""
+    """Two LEDs on rods above the object's sides, which light surfaces that face up; they hide some
+    2 % of the pixels, which a merge leaves out. auto: where they fit; true: or the design is
+    refused; false: surfaces that face up stay dark."""
     shroud: Annotated[bool, OR_AUTO] = AUTO
     """A box of matt black card round the whole rig; auto: where a sheet is large enough."""
     shroud_gap_mm: float = Field(10.0, ge=2, le=500)
