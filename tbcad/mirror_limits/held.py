@@ -91,7 +91,7 @@ class Chain:
 
 def refused(name: str) -> str:
     """The verdict on what a chain does not hold."""
-    return f"{NOT_HELD}: order a larger margin with --process {name}"
+    return f"{NOT_HELD}: tbcad build --process {name} has larger margins"
 
 
 def chain_of(

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, model_validator
 
 from tbcad.cad.formats.checked_files import Finite
 from tbcad.records.document import Document, RecordSection
@@ -16,8 +16,8 @@ class NeededLens(RecordSection):
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
-    focus_mm: Finite = Field(gt=0, le=1e5)
-    pupil_mm: Finite = Field(gt=0, le=100)
+    focus_mm: Finite = Field(ge=1, le=1e5, strict=True)
+    pupil_mm: Finite = Field(ge=0.01, le=100, strict=True)
 
 
 class ListedLens(RecordSection):
@@ -27,8 +27,8 @@ class ListedLens(RecordSection):
 
     camera: str
     lens: str
-    focal_mm: Finite = Field(gt=0, le=1e5)
-    f_number: Finite = Field(gt=0, le=1e3)
+    focal_mm: Finite = Field(ge=0.1, le=1e5, strict=True)
+    f_number: Finite = Field(ge=0.1, le=1e3, strict=True)
 
     @property
     def name(self) -> str:
@@ -46,6 +46,12 @@ class CameraSheet(Document):
     requirements: NeededLens
     mounted: str | None = None
     candidates: tuple[ListedLens, ...] = ()
+
+    @model_validator(mode="after")
+    def _mounted_is_listed(self) -> "CameraSheet":
+        if self.mounted is not None and self.in_use is None:
+            raise ValueError(f"mounted: {self.mounted} is none of the candidates")
+        return self
 
     @property
     def in_use(self) -> ListedLens | None:

@@ -184,7 +184,7 @@ def test_what_is_not_held_is_never_quoted_as_held(
 ) -> None:
     out = tmp_path / "out"
     told = cli("order", exports, "--process", "sla", "--out", out, code=1).out
-    remedy = "not held: order a larger margin with --process sla"
+    remedy = "not held: tbcad build --process sla has larger margins"
     offset = next(line for line in told.splitlines() if "offset" in line)
     assert offset.endswith(remedy)
     assert (out / "shell_a_tolerances.step").read_text("ascii").count(remedy) >= 2

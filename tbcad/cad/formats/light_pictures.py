@@ -22,6 +22,7 @@ from tbcad.errors import InputError
 from tbcad.types import Bytes, Floats
 
 HDR_SIGNATURE = b"#?"
+OLD_RUNS = "it has runs of before 1991"
 HDR_FORMAT = "32-bit_rle_rgbe"
 EXPONENT = 128 + 8  # bias, and bits of a mantissa
 RUN_WIDTHS = range(8, 32_768)  # of scanlines that may have runs
@@ -61,6 +62,8 @@ def hdr_picture(data: bytes, name: str) -> Floats:
     try:
         pixels = np.stack(list(_scanlines(data, resolution.end(), *shape)))
     except (IndexError, ValueError) as error:
+        if str(error) == OLD_RUNS:
+            raise InputError(f"{name}: {error}: save it again with a program of today") from None
         reason = "it ends early" if isinstance(error, IndexError) else error
         raise damaged(name, reason) from None
     light = pixels[..., :3] * np.ldexp(1.0, pixels[..., 3:].astype(np.int64) - EXPONENT)
@@ -107,7 +110,7 @@ def _scanlines(data: bytes, at: int, lines: int, width: int) -> Iterator[Bytes]:
         else:
             line = np.frombuffer(data[at : at + 4 * width], np.uint8).reshape(-1, 4)
             if (line[:, :3] == 1).all(axis=1).any():
-                raise ValueError("it has runs of before 1991")
+                raise ValueError(OLD_RUNS)
             if len(line) < width:
                 raise IndexError
             at += 4 * width
