@@ -13,9 +13,10 @@ from PIL import Image
 from tbcad.app.cli import run
 from tbcad.core.camera.sheet import write_camera_sheet
 from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.errors import InputError
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.options.shared import numbers
-from tbcad.records.camera_sheet import RealOpticsRecord
+from tbcad.records.camera_sheet import CameraSheet, RealOpticsRecord
 from tbcad.rig.runs import read_run
 from tests.app.cli.commands import Command
 from tests.exported_files import contents
@@ -69,6 +70,26 @@ def test_capture_with_real_optics(
     with LightField.open(out) as source:
         assert source.facts["real"] == written["real"]
     assert "PSNR" in cli("view", out, "--out", tmp_path / "view.png", *SMALL).out
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "reason"),
+    [
+        ("pupil_mm", 1e-9, "pupil_mm: input should be greater"),
+        ("pupil_mm", "0.9", "pupil_mm: input should be a valid number"),
+        ("focus_mm", True, "focus_mm: input should be a valid number"),
+        ("mounted", "x", "mounted: x is none of the candidates"),
+    ],
+)
+def test_an_edited_camera_sheet_is_refused(
+    tmp_path: Path, low_resolution_design: MirrorDesign, key: str, value: object, reason: str
+) -> None:
+    write_camera_sheet(tmp_path, low_resolution_design.arrays[0], 30.0)
+    sheet = json.loads((tmp_path / "camera.json").read_text())
+    (sheet if key in sheet else sheet["requirements"])[key] = value
+    (tmp_path / "camera.json").write_text(json.dumps(sheet))
+    with pytest.raises(InputError, match=reason):
+        CameraSheet.read(tmp_path / "camera.json")
 
 
 @pytest.mark.parametrize(
