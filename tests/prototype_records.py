@@ -8,6 +8,28 @@ from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.prototype_drive import DriveRecord, PowerOff
 
 Record = dict[str, Any]
+UPPER_LAMPS = {
+    "part": "STAR-3535-8",
+    "leds": [
+        {
+            "names": [f"upper_board_{k}", f"upper_rod_{k}"],
+            "position_mm": [0.0, 40.0 * side, 30.0],
+            "direction": [0.0, -0.8 * side, -0.6],
+            "head_mm": [[0.0, 40.0 * side, 30.0], [0.0, 43.2 * side, 32.4]],
+            "rod_mm": [
+                [0.0, 43.0 * side, 32.0],
+                [0.0, 46.0 * side, 28.0],
+                [0.0, 70.0 * side, -60.0],
+            ],
+        }
+        for k, side in ((1, 1.0), (2, -1.0))
+    ],
+    "candela_each": 2.0,
+    "current_ma": 15.7,
+    "head_diameter_mm": 8.0,
+    "rod_diameter_mm": 1.5,
+    "tolerance_mm": 0.75,
+}
 LAMP_SECTION = {
     **{"strip": "STRIP-COB-24V", "strips": 2, "length_mm": 50.0, "width_mm": 16.0, "level": False},
     "places": [

@@ -65,8 +65,10 @@ class Loop:
 
 @pytest.fixture(scope="module")
 def loop(low_resolution_design: MirrorDesign, tmp_path_factory: pytest.TempPathFactory) -> Loop:
-    folder = tmp_path_factory.mktemp("loop")
-    build(low_resolution_design.spec, folder / "exports", parts=["prototype"], verify=False)
+    folder, spec = tmp_path_factory.mktemp("loop"), low_resolution_design.spec
+    prototype = spec.prototype.model_copy(update={"ball_margin_mm": 0.0})
+    spec = spec.model_copy(update={"prototype": prototype})
+    build(spec, folder / "exports", parts=["prototype"], verify=False)
     return Loop(folder)
 
 

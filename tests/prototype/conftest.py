@@ -35,7 +35,7 @@ def spec() -> PrototypeSpec:
 @pytest.fixture(scope="session")
 def paper_prototype(paper_design: MirrorDesign) -> PrototypeLayout:
     """The prototype of the paper's design with heavy balls: 16, some of them caps."""
-    return prototype_layout(load_spec(None, HEAVY), paper_design)
+    return prototype_layout(load_spec(None, ["prototype.ball_margin_mm=0", *HEAVY]), paper_design)
 
 
 @pytest.fixture(scope="session")

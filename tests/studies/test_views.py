@@ -124,7 +124,8 @@ def test_low_pass_filter_blurs_the_views(export_folder: Path) -> None:
         )
         assert 1 == none["photograph_contrast"] > narrow["photograph_contrast"]
         assert narrow["photograph_contrast"] > wide["photograph_contrast"] > 0.2
-        assert none["blur_mm"] < narrow["blur_mm"] < wide["blur_mm"]
+        # It is found among the blurs of a list, so that two may be the same one.
+        assert none["blur_mm"] < narrow["blur_mm"] <= wide["blur_mm"]
         assert none["ssim"] > wide["ssim"]
     (shell,) = means.where(geometry="shell", view="aperture").records()
     assert shell["blur_mm"] < none["blur_mm"]

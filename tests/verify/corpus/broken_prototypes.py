@@ -537,7 +537,7 @@ UNSURE: Broken = {
     },
     ("drive", RECORD): {
         "another motor": (record("bought/motor/part", "NEMA17-20"), "NEMA17-20 is no motor"),
-        "a wheel of other teeth": (record("bought/wheel/part", "GT2-60"), "not 60 teeth"),
+        "a wheel of other teeth": (record("bought/wheel/part", "GT2-80"), "not have 80 teeth"),
     },
     ("hold ratio", RECORD): {
         "a smaller magnet": (record("fasteners/MAGNET/part", "MAGNET-4x3"), "its pocket is")

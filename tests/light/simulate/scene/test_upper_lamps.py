@@ -10,36 +10,15 @@ from tbcad.light.simulate.scene.lamps import read_lamps
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import cast_rays, object_in_front, prepared_scene
 from tbcad.light.simulate.scene.upper_lamps import hidden_rays, upper_facets, upper_screen
-from tests.prototype_records import LAMP_SECTION, write_prototype
-
-UPPER = {
-    "part": "STAR-3535-8",
-    "leds": [
-        {
-            "names": [f"upper_board_{k}", f"upper_rod_{k}"],
-            "position_mm": [0.0, 40.0 * side, 30.0],
-            "direction": [0.0, -0.8 * side, -0.6],
-            "head_mm": [[0.0, 40.0 * side, 30.0], [0.0, 43.2 * side, 32.4]],
-            "rod_mm": [
-                [0.0, 43.0 * side, 32.0],
-                [0.0, 46.0 * side, 28.0],
-                [0.0, 70.0 * side, -60.0],
-            ],
-        }
-        for k, side in ((1, 1.0), (2, -1.0))
-    ],
-    "candela_each": 2.0,
-    "current_ma": 15.7,
-    "head_diameter_mm": 8.0,
-    "rod_diameter_mm": 1.5,
-    "tolerance_mm": 0.75,
-}
+from tests.prototype_records import LAMP_SECTION, UPPER_LAMPS, write_prototype
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An export whose prototype has them."""
-    return write_prototype(tmp_path_factory.mktemp("upper"), lamps={**LAMP_SECTION, "upper": UPPER})
+    return write_prototype(
+        tmp_path_factory.mktemp("upper"), lamps={**LAMP_SECTION, "upper": UPPER_LAMPS}
+    )
 
 
 def test_rays_are_hidden_before_the_object_and_not_beyond_it(folder: Path) -> None:
