@@ -24,6 +24,7 @@ SMALL = load_spec(
         *("prototype.frame.clearance_mm=1.5", *HEAVY),
     ],
 )
+PAPER = load_spec(None, ["prototype.ball_margin_mm=0", *HEAVY])
 CAPTURE_RADIUS = 30.0
 
 
@@ -35,7 +36,7 @@ def spec() -> PrototypeSpec:
 @pytest.fixture(scope="session")
 def paper_prototype(paper_design: MirrorDesign) -> PrototypeLayout:
     """The prototype of the paper's design with heavy balls: 16, some of them caps."""
-    return prototype_layout(load_spec(None, ["prototype.ball_margin_mm=0", *HEAVY]), paper_design)
+    return prototype_layout(PAPER, paper_design)
 
 
 @pytest.fixture(scope="session")

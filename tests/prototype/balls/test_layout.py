@@ -26,10 +26,9 @@ from tbcad.prototype.balls.selection import (
     coverable,
 )
 from tbcad.prototype.balls.stops import plan_stops, stop_requests
-from tests.prototype.conftest import HEAVY
+from tests.prototype.conftest import PAPER
 
-SPEC = load_spec(None, HEAVY)
-LIMITS = SPEC.prototype
+LIMITS = PAPER.prototype
 DEGREE = np.radians(1)
 
 
