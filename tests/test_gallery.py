@@ -1,9 +1,7 @@
 """The gallery of designs: all of them, as `python docs/gallery.py` writes it from its figures."""
 
-import importlib.util
 import json
 import re
-from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -11,18 +9,12 @@ import pytest
 import tbcad
 from tbcad.core.spec.load import shipped_designs
 from tbcad.output.overview import overview
-
-DOCS = Path(__file__).parents[1] / "docs"
+from tests.docs_scripts import docs_script
 
 
 @pytest.fixture(scope="module")
 def gallery() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("gallery", DOCS / "gallery.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return docs_script("gallery")
 
 
 def test_page_has_every_design_and_the_figures_that_were_found(gallery: ModuleType) -> None:

@@ -1,6 +1,5 @@
 """Each picture of the documentation has a command, and is known to be as old as what it shows."""
 
-import importlib.util
 import re
 import shlex
 from pathlib import Path
@@ -10,19 +9,14 @@ import pytest
 
 from tbcad.report.prototype_pictures import SIDES
 from tests.app.cli.commands import commands
+from tests.docs_scripts import DOCS, docs_script
 
 ROOT = Path(__file__).parents[1]
-DOCS = ROOT / "docs"
 
 
 @pytest.fixture(scope="module")
 def ages() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("picture_ages", DOCS / "picture_ages.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return docs_script("picture_ages")
 
 
 def test_every_picture_has_a_command_and_a_page(ages: ModuleType) -> None:

@@ -13,7 +13,7 @@ from tbcad.tolerancing.montecarlo.builds import CameraCoverage, Case, CoverageCa
 from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models
 from tbcad.tolerancing.process.process import BUILT_IN, load_process, process_errors
 from tbcad.tolerancing.prototype.gravity import read_gravity
-from tbcad.tolerancing.prototype.windows import CalibratedCase, prototype_model
+from tbcad.tolerancing.prototype.windows import PrototypeCase, prototype_model
 from tbcad.types import Progress
 
 BUILDS = FEW  # by a process that may be good; others end when enough of them have failed
@@ -43,7 +43,7 @@ def prototype_as_made(export: ExportedDesign) -> ProcessYield:
     spec, plan = export.spec, read_plan(export)
     model = prototype_model(export.reflectors, plan, read_gravity(export, plan))
     errors = process_errors(load_process(PRINTED_BY), spec.mirrors.coating_um, spec.prototype.caps)
-    return _yield(CalibratedCase(model, errors, SEED), PRINTED_BY, export.capture_mm)
+    return _yield(PrototypeCase(model, errors, SEED).calibrated, PRINTED_BY, export.capture_mm)
 
 
 def _shell_yield(models: EdgeModels, name: str, spec: Spec) -> ProcessYield:

@@ -12,7 +12,7 @@ from tbcad.tolerancing.as_made import BUILDS, PRINTED_BY, SEED, prototype_as_mad
 from tbcad.tolerancing.montecarlo.builds import simulate
 from tbcad.tolerancing.process.process import load_process, process_errors
 from tbcad.tolerancing.prototype.gravity import read_gravity
-from tbcad.tolerancing.prototype.windows import CalibratedCase, PrototypeCase, prototype_model
+from tbcad.tolerancing.prototype.windows import PrototypeCase, prototype_model
 
 
 def test_prototypes_are_those_of_the_analysis_after_calibration(
@@ -25,9 +25,9 @@ def test_prototypes_are_those_of_the_analysis_after_calibration(
     model = prototype_model(export.reflectors, plan, read_gravity(export, plan))
     errors = process_errors(load_process(PRINTED_BY), caps=spec.prototype.caps)
     every = simulate(PrototypeCase(model, errors, SEED), 10).calibrated
-    quick = simulate(CalibratedCase(model, errors, SEED), 10)
+    quick = simulate(PrototypeCase(model, errors, SEED).calibrated, 10)
     assert quick.coverage.tolist() == every.coverage.tolist()
-    worst = simulate(CalibratedCase(model, errors, SEED), BUILDS).worst
+    worst = simulate(PrototypeCase(model, errors, SEED).calibrated, BUILDS).worst
     bad = np.append(0, (worst < export.capture_mm).cumsum())
     made = prototype_as_made(export)
     assert made.process == PRINTED_BY

@@ -20,7 +20,7 @@ from tbcad.light.simulate.prototype.ball_rays import (
     points_within_walls,
 )
 from tbcad.light.simulate.prototype.run import HALF_TURN, SPHERES
-from tbcad.light.simulate.scene.ray_casting import embree_scene
+from tbcad.light.simulate.scene.ray_casting import distances_to, embree_scene
 from tbcad.light.simulate.scene.upper_lamps import upper_facets
 from tbcad.records.prototype import NAME, PrintedPartRecord, Prototype
 from tbcad.rig.machine.designed import BuiltPrototype
@@ -55,8 +55,7 @@ class Occluders:
 def _nearer(scene: Any | None, origin: Floats, direction: Floats, length: Floats) -> Bools:
     if scene is None or len(origin) == 0:
         return np.zeros(len(origin), dtype=bool)
-    hits = scene.run(origin.astype(np.float32), direction.astype(np.float32), output=1)
-    return np.asarray((hits["primID"] >= 0) & (hits["tfar"] < length - NEAR_MM))
+    return np.asarray(distances_to(scene, origin, direction) < length - NEAR_MM)
 
 
 def stage_scene(folder: Path) -> Any | None:

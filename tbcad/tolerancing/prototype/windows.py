@@ -217,25 +217,18 @@ class PrototypeCase:
 
     def __call__(self, builds: range) -> PrototypeResult:
         """Result of the builds of these numbers."""
+        return prototype_result(self.model, self.draws(builds))
+
+    def draws(self, builds: range) -> PrototypeDraws:
+        """Errors of the builds of these numbers."""
         model = self.model
-        draws = draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.gravity)
-        return prototype_result(model, draws)
+        return draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.gravity)
 
-
-@dataclass(frozen=True)
-class CalibratedCase:
-    """The builds of `PrototypeCase`, but only what their virtual cameras cover once calibrated."""
-
-    model: PrototypeWindows
-    errors: Errors
-    seed: int
-
-    def __call__(self, builds: range) -> CameraCoverage:
-        """Coverage of the builds of these numbers."""
-        model = self.model
-        draws = draw_prototypes(self.errors, self.seed, builds, model.is_cap, model.gravity)
-        rows = [_coverage(model, calibrated_poses(model, draws, k)) for k in range(len(draws))]
-        return CameraCoverage(np.array(rows))
+    def calibrated(self, builds: range) -> CameraCoverage:
+        """Only what virtual cameras of these builds cover once calibrated."""
+        draws = self.draws(builds)
+        poses = (calibrated_poses(self.model, draws, k) for k in range(len(draws)))
+        return CameraCoverage(np.array([_coverage(self.model, both) for both in poses]))
 
 
 @dataclass(frozen=True)

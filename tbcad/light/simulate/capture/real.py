@@ -77,6 +77,16 @@ class LensSample:
     shift: Shift  # its place from the pixel's centre, pixels
     point: PupilPoint  # that it goes through
 
+    def own(self, samples: Signal, fine: int) -> Signal:
+        """Its samples among those of `no_samples`, one of each pixel, (h, w, 3), to be filled."""
+        edge = KERNEL_PX * fine
+        return samples[self.row :: fine, edge + self.column : samples.shape[1] - edge : fine]
+
+
+def no_samples(rows: int, columns: int, fine: int) -> Signal:
+    """Fine samples of pixels, black, with the reach of the kernel beside each row."""
+    return np.zeros((fine * rows, fine * (columns + 2 * KERNEL_PX), 3), dtype=np.float32)
+
 
 def lens_samples(axes: Floats, optics: RealOptics, margin_px: int = 0) -> list[LensSample]:
     """The rays of each pixel of a camera with axes (3, 3), over its fine samples and its pupil."""
@@ -139,11 +149,11 @@ def _band(
     front, _ = _in_front(scene, camera.pinhole, unit_directions(camera, rows), rays)
     rays = rays.without(front)
     wide = range(rows.start - KERNEL_PX, rows.stop + KERNEL_PX)
-    edge, width = KERNEL_PX * n, n * camera.width_px
-    samples = np.zeros((n * len(wide), width + 2 * edge, 3), dtype=np.float32)
+    samples = no_samples(len(wide), camera.width_px, n)
     for one, trace in through:
-        own = samples[one.row :: n, edge + one.column : edge + width : n]
-        own[:] = _seen(camera, one, trace(wide, one.shift), scene, (optics.reflectance, wide))
+        one.own(samples, n)[:] = _seen(
+            camera, one, trace(wide, one.shift), scene, (optics.reflectance, wide)
+        )
     light = pixels_of_samples(samples, kernel_factors(optics.kernel(camera)), n)
     places = rays.origin.astype(np.float32), rays.direction.astype(np.float32)
     return (rays.mirror, *places), light

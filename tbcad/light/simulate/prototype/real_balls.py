@@ -17,6 +17,7 @@ from tbcad.light.simulate.capture.real import (
     RealOptics,
     developed,
     lens_samples,
+    no_samples,
     with_scatter,
 )
 from tbcad.light.simulate.capture.sensor import Signal
@@ -75,12 +76,11 @@ def _samples(
 ) -> Signal:
     """Fine samples of rows, with the reach of the kernel round them; 0 where none is needed."""
     rows, needed = part
-    n, edge, width = optics.fine, KERNEL_PX * optics.fine, optics.fine * needed.shape[1]
-    samples = np.zeros((n * len(needed), width + 2 * edge, 3), dtype=np.float32)
+    samples = no_samples(len(needed), needed.shape[1], optics.fine)
     row, column = np.nonzero(needed)
     centres = np.column_stack([column, row + rows.start - KERNEL_PX]).astype(np.float64)
     for one in lens_samples(run.camera.axes, optics):
-        own = samples[one.row :: n, edge + one.column : edge + width : n]
+        own = one.own(samples, optics.fine)
         own[row, column] = _seen(run, scene, stop, optics.reflectance, (one, centres))
     return samples
 

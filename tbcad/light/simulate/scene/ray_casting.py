@@ -187,9 +187,15 @@ def _put_before(
     screen: Any, origin: Floats, direction: Floats, colour: Colours, depth: Floats
 ) -> None:
     """Make rays black, and as long, as the bodies that they meet before the object."""
-    hits = screen.run(origin.astype(np.float32), direction.astype(np.float32), output=1)
-    nearer = (hits["primID"] >= 0) & (hits["tfar"] < depth)
-    colour[nearer], depth[nearer] = BACKGROUND, hits["tfar"][nearer]
+    distance = distances_to(screen, origin, direction)
+    nearer = distance < depth
+    colour[nearer], depth[nearer] = BACKGROUND, distance[nearer]
+
+
+def distances_to(embree: Any, origin: Floats, direction: Floats) -> Floats:
+    """Distances (n,) along rays (n, 3) to the facets of an Embree scene; infinite without one."""
+    hits = embree.run(origin.astype(np.float32), direction.astype(np.float32), output=1)
+    return np.where(hits["primID"] >= 0, hits["tfar"].astype(np.float64), np.inf)
 
 
 def _light(scene: Scene, hits: SurfaceHits) -> Floats:

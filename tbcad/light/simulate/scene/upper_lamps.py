@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from tbcad.core.geometry.primitives import cylinder_between, enclosing_triangles
-from tbcad.core.geometry.vectors import dot, unit
-from tbcad.light.simulate.scene.ray_casting import embree_scene
+from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.light.simulate.scene.ray_casting import distances_to, embree_scene
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.types import Bools, Floats
 
@@ -55,13 +55,7 @@ def hidden_rays(screen: Any | None, pinhole: Floats, point: Floats, direction: F
     if screen is None or len(point) == 0:
         return np.zeros(len(point), dtype=bool)
     to_ball = point - pinhole
-    length = np.maximum(np.linalg.norm(to_ball, axis=1), 1e-9)
-    before = _first(screen, np.broadcast_to(pinhole, point.shape), to_ball / length[:, None])
-    after = _first(screen, point, direction)
+    length = np.maximum(norm(to_ball), 1e-9)
+    before = distances_to(screen, np.broadcast_to(pinhole, point.shape), to_ball / length[:, None])
+    after = distances_to(screen, point, direction)
     return np.asarray((before < length) | (after < np.maximum(-dot(point, direction), 0)))
-
-
-def _first(screen: Any, origin: Floats, direction: Floats) -> Floats:
-    """Distance (n,) along rays to a screen; infinite where they miss it."""
-    hits = screen.run(origin.astype(np.float32), direction.astype(np.float32), output=1)
-    return np.where(hits["primID"] >= 0, hits["tfar"].astype(np.float64), np.inf)
