@@ -10,7 +10,6 @@ from scipy.ndimage import convolve1d
 
 from tbcad.common.compiled import compiled
 from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
-from tbcad.light.simulate.capture.photograph import row_bands
 from tbcad.light.simulate.capture.sensor import (
     Image16,
     PixelMaps,
@@ -21,9 +20,10 @@ from tbcad.light.simulate.capture.sensor import (
     pixel_maps,
     recorded,
 )
+from tbcad.light.simulate.parallel import chunks
 from tbcad.light.simulate.prototype.ball_rays import ball_hits, camera_colours
 from tbcad.light.simulate.prototype.run import HALF_TURN, turned_balls
-from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.light.simulate.scene.ray_casting import RAYS_PER_CHUNK, Scene
 from tbcad.records.run import DARK, DARK_LIT, LIT, Frame, PhaseTimes
 from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.rig.simulated_run.led_light import (
@@ -33,6 +33,7 @@ from tbcad.rig.simulated_run.led_light import (
     balls_of_frame,
     led_light,
 )
+from tbcad.rig.simulated_run.pixel_blocks import PixelBlocks, boxes_about, pixel_blocks
 from tbcad.types import Colours, Floats
 
 EXPOSURE_S = 1.0  # in which LEDs and object give the light that follows
@@ -96,6 +97,11 @@ class SimulatedRun:
         """Unit directions through the pixels, (h, w, 3)."""
         return pixel_directions(self.built.machine.camera)
 
+    @cached_property
+    def blocks(self) -> PixelBlocks:
+        """Blocks of its pixels."""
+        return pixel_blocks(self.directions)
+
     def frame_photographs(self, number: int, phases: tuple[str, ...]) -> dict[str, Image16]:
         """The photographs of a frame, from 0, in some phases."""
         frame = self.frames[number]
@@ -118,7 +124,9 @@ class SimulatedRun:
         pinhole = self.built.machine.camera.pinhole
         balls, turned = balls_of_frame(self.built, number), self._turned(number)
         walls = self.built.walls
-        colour = object_light(pinhole, self.directions, balls, self.scene, turned, walls)
+        colour = object_light(
+            pinhole, self.directions, balls, self.scene, turned, walls, self.blocks
+        )
         brightness = self.chain.object_light * self.chain.exposure(LIT)
         share = colour.astype(np.float32) * np.float32(brightness / WHITE)
         return blurred(share, self.chain.spread)
@@ -155,27 +163,35 @@ def object_light(
     scene: Scene,
     turned: bool,
     walls: GrooveWalls = NO_WALLS,
+    blocks: PixelBlocks | None = None,
 ) -> Colours:
     """Picture of a lit object by a camera, 0 to 255, (h, w, 3).
 
-    Its pixels have directions (h, w, 3); balls are (k, 8) in the frame, or with forms behind these
-    columns. The scene is the object as it stands in the first run; it may be turned by 180 degrees.
+    Its pixels have directions (h, w, 3), and blocks; balls are (k, 8) in the frame, or with forms
+    behind these columns. The scene is the object as it stands in the first run; it may be turned by
+    180 degrees.
     """
+    blocks = blocks or pixel_blocks(directions)
+    # A front ends within the sphere in its seat; nothing else is seen but the object itself.
+    place = np.concatenate([balls[:, 4:7], np.zeros((1, 3))]) - pinhole
+    pixels = blocks.pixels(blocks.about(place, np.append(balls[:, 7], scene.radius)))
     # Seen from the object, which rests, camera and balls are turned instead.
     flip = HALF_TURN if turned else np.ones(3)
     pinhole, walls = pinhole * flip, walls.flipped(flip)
-    balls = turned_balls(balls, flip)
-    bands = (directions[rows.start : rows.stop] * flip for rows in row_bands(len(directions)))
-    return np.concatenate([_band(pinhole, balls, walls, scene, band) for band in bands])
+    balls, every = turned_balls(balls, flip), directions.reshape(-1, 3)
+    picture = np.zeros(directions.shape, dtype=np.float32)
+    for part in chunks(len(pixels), RAYS_PER_CHUNK):
+        own = pixels[part]
+        picture.reshape(-1, 3)[own] = _colours(pinhole, balls, walls, scene, every[own] * flip)
+    return picture
 
 
-def _band(
-    pinhole: Floats, balls: Floats, walls: GrooveWalls, scene: Scene, directions: Floats
+def _colours(
+    pinhole: Floats, balls: Floats, walls: GrooveWalls, scene: Scene, direction: Floats
 ) -> Colours:
-    direction = directions.reshape(-1, 3)
     stop = np.zeros(len(direction), dtype=np.int64)
     hits = ball_hits(pinhole, balls[None], direction, stop, walls)
-    return camera_colours(scene, pinhole, direction, hits).reshape(directions.shape)
+    return camera_colours(scene, pinhole, direction, hits)
 
 
 def add_points(image: NDArray[np.float32], pixel: Floats, light: Floats, psf: PointSpread) -> None:
@@ -194,8 +210,12 @@ def blurred(picture: NDArray[np.float32], psf: PointSpread) -> NDArray[np.float3
     # The middle row of a point's image is its spread along the row; its sum is made one.
     _add_points(line, centre, np.ones(1), psf.separation_px, psf.lens_px, half)
     kernel = (line[0] / line.sum()).astype(np.float32)
-    across = convolve1d(picture, kernel, axis=1, mode="constant")
-    return np.asarray(convolve1d(across, kernel, axis=0, mode="constant"))
+    found = np.zeros_like(picture)
+    for box in boxes_about(picture, half):
+        across = convolve1d(picture[box], kernel, axis=1, mode="constant")
+        # Where another box has more, light from beyond this one is missing here.
+        found[box] = np.maximum(found[box], convolve1d(across, kernel, axis=0, mode="constant"))
+    return found
 
 
 @compiled
