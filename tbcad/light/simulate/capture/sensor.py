@@ -116,7 +116,8 @@ def recorded(
     faint = EMPTY / sensor.full_electrons
     shining: Bools = np.zeros(maps.transmission.size, dtype=bool)
     if pixels is not None:
-        shining[:] = (pixels > faint).any(axis=1)
+        for colour in pixels.T:  # much quicker than any() of three
+            shining |= colour > faint
     shining[maps.hot] = True
     bright = np.flatnonzero(shining)
     electrons = np.full((len(bright), colours), sensor.dark_electrons)
