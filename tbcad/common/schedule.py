@@ -13,6 +13,7 @@ import socket
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache, partial
 from hashlib import sha256
 from importlib.metadata import version
@@ -97,7 +98,9 @@ def run_units(
     """
     if scheduler is None:
         return _in_threads(work, units, progress, workers or cores())
-    with _quiet(), _scheduler_errors(scheduler), _cluster(scheduler, patience) as client:
+    if not units:
+        return []
+    with one_client(scheduler, patience) as client, _scheduler_errors(scheduler):
         from cloudpickle import dumps
 
         # The work is sent once, as a task of its own: if all that hold it die, it is made again.
@@ -107,6 +110,28 @@ def run_units(
         # However this ends, by an interrupt too: the client goes, and what is not done is dropped.
         check = _worker_check(client, scheduler, patience)
         return _gathered(client, futures, units, progress, check)
+
+
+_CLIENTS: ContextVar[dict[str, Any] | None] = ContextVar("clients", default=None)
+
+
+@contextmanager
+def one_client(scheduler: str | None, patience: float = PATIENCE) -> Iterator[Any]:
+    """A client of a scheduler, which every `run_units` within the block uses too.
+
+    Without a scheduler, None: a command has the block whatever it is given. Errors are those of
+    `run_units`.
+    """
+    known = _CLIENTS.get() or {}
+    if scheduler is None or scheduler in known:
+        yield known.get(scheduler or "")
+        return
+    with _quiet(), _scheduler_errors(scheduler), _cluster(scheduler, patience) as client:
+        token = _CLIENTS.set({**known, scheduler: client})
+        try:
+            yield client
+        finally:
+            _CLIENTS.reset(token)
 
 
 def _in_threads(

@@ -20,7 +20,7 @@ import pytest
 from tbcad_verify.run.processes import at_once
 
 from tbcad.common import schedule
-from tbcad.common.schedule import background_processes, cores, run_units, versions
+from tbcad.common.schedule import background_processes, cores, one_client, run_units, versions
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
 
@@ -136,6 +136,38 @@ def standing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
     made.stop()
 
 
+def sent_by_value() -> Callable[[int], float]:
+    """What `drawn` gives, by a function of no module: a worker knows no tests."""
+
+    def work(unit: int) -> float:
+        import numpy as np
+
+        generator = np.random.Generator(np.random.Philox(key=unit))
+        return float(generator.standard_normal(1000).sum())
+
+    return work
+
+
+def fatal_once(file: str, fatal: int) -> Callable[[int], float]:
+    """The same, but of one unit only the second time: the first kills its process."""
+    work = sent_by_value()
+
+    def dying(unit: int) -> float:
+        import os
+        import signal
+
+        if unit == fatal:
+            try:
+                mark = os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
+            except FileExistsError:
+                return work(unit)
+            os.write(mark, str(os.getpid()).encode())
+            os.kill(os.getpid(), signal.SIGKILL)
+        return work(unit)
+
+    return dying
+
+
 class Marks:
     """Files that tell which process has begun and ended which unit."""
 
@@ -144,19 +176,16 @@ class Marks:
         folder.mkdir()
 
     def work(self, seconds: float) -> Callable[[int], float]:
-        folder = str(self.folder)
+        folder, work = str(self.folder), sent_by_value()
 
-        def marked(unit: int) -> float:  # sent by value: a worker knows no tests
+        def marked(unit: int) -> float:
             import os
             import time
             from pathlib import Path
 
-            import numpy as np
-
             (Path(folder) / f"begun-{os.getpid()}-{unit}").touch()
             time.sleep(seconds)
-            generator = np.random.Generator(np.random.Philox(key=unit))
-            result = float(generator.standard_normal(1000).sum())
+            result = work(unit)
             (Path(folder) / f"ended-{os.getpid()}-{unit}").touch()
             return result
 
@@ -181,25 +210,48 @@ class TestCluster:
         assert sorted(told) == list(range(20))
         assert all(marks.of("ended", worker.pid) for worker in standing.workers)
 
-    @pytest.mark.slow
-    def test_a_worker_killed_in_mid_run_loses_nothing(
+    def test_a_worker_killed_in_mid_run_changes_nothing(
         self, cluster: Cluster, tmp_path: Path
     ) -> None:
+        """It kills itself within a unit, the first time that this unit is begun."""
         cluster.start(2)
-        victim, other = (worker.pid for worker in cluster.workers)
-        marks, cut = Marks(tmp_path / "marks"), []
-
-        def kill(unit: int) -> None:
-            if not cut and len(marks.of("ended", victim)) >= 3:
-                until(lambda: marks.of("begun", victim) != marks.of("ended", victim))
-                os.kill(victim, signal.SIGKILL)
-                cut.extend(set(marks.of("begun", victim)) - set(marks.of("ended", victim)))
-
-        got = run_units(marks.work(0.15), range(24), cluster.address, kill)
+        died = tmp_path / "died"
+        got = run_units(fatal_once(str(died), 7), range(24), cluster.address)
         assert got == [drawn(unit) for unit in range(24)]
-        assert len(cut) == 1
-        assert cluster.workers[0].wait(5) == -signal.SIGKILL
-        assert set(cut) <= set(marks.of("ended", other))
+        gone = int(died.read_text())
+        (victim,) = (one for one in cluster.workers if one.pid == gone)
+        assert victim.wait(30) == -signal.SIGKILL
+
+    def test_one_connection_for_all_work_of_a_command(
+        self, standing: Cluster, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        import distributed
+
+        opened: list[str] = []
+
+        class Counted(distributed.Client):
+            def __init__(self, address: str, **options: object) -> None:
+                opened.append(address)
+                super().__init__(address, **options)
+
+        monkeypatch.setattr(distributed, "Client", Counted)
+        work = sent_by_value()
+        with one_client(standing.address) as client, one_client(standing.address) as same:
+            assert client is same
+            for part in (range(5), range(5, 9)):
+                assert run_units(work, part, standing.address) == [drawn(unit) for unit in part]
+        assert opened == [standing.address]
+        assert client.status == "closed"
+        assert run_units(work, [3], standing.address) == [drawn(3)]  # one of its own
+        assert len(opened) == 2
+
+    def test_what_fails_in_a_command_closes_its_connection(self, standing: Cluster) -> None:
+        with pytest.raises(KeyError), one_client(standing.address) as client:
+            raise KeyError
+        assert client.status == "closed"
+        with one_client(None) as nothing:
+            assert nothing is None
+            assert run_units(drawn, [1]) == [drawn(1)]
 
     def test_an_interruption_ends_it_on_the_workers_too(
         self, standing: Cluster, tmp_path: Path

@@ -84,13 +84,15 @@ def optimize(options: OptimizeOptions) -> SearchResult:
         InputError: the design is not allowed or cannot be made, or a file exists.
     """
     from tbcad.common.atomic_files import replace_files
+    from tbcad.common.schedule import one_client
     from tbcad.optimizing.search import search, search_files
 
     options.check()
     spec = chosen_spec(options.design, None, options.settings)
     store = _checked_store(options)
     options.progress("optimize: candidates")
-    result = search(spec, options, store)
+    with one_client(options.scheduler):
+        result = search(spec, options, store)
     options.progress("optimize: files")
     replace_files(store.parent, search_files(result, spec, options))
     return result

@@ -83,6 +83,7 @@ def tolerance(options: ToleranceOptions) -> Analysis:
         InputError: build or process cannot be read, or mirrors are planar.
     """
     process, exports = checked_process(options), Path(options.exports)
+    from tbcad.common.schedule import one_client
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.tolerancing.analysis import analyse as analyse_export
@@ -91,7 +92,8 @@ def tolerance(options: ToleranceOptions) -> Analysis:
     export = read_export(exports)
     taken = ObjectOptions(up=options.up, unit=options.unit)
     subject = load_object(options.object_file, export.capture_mm, taken, options.answer)
-    return analyse_export(export, process, subject, options)
+    with one_client(options.scheduler):
+        return analyse_export(export, process, subject, options)
 
 
 analyse = tolerance  # as it was called at first

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import find_objects, label
 
-from tbcad.core.geometry.vectors import dot, norm, unit
+from tbcad.core.geometry.vectors import norm, unit
 from tbcad.types import Bools, Floats, Ints
 
 SIDE = 16  # pixels

@@ -26,7 +26,9 @@ LENS = LensCamera(
 def test_every_ray_that_meets_a_sphere_is_in_its_blocks(seed: int) -> None:
     random = np.random.default_rng(seed)
     directions = pixel_directions(LENS)
-    place = LENS.directions(random.uniform(0, SIZE, (3, 2))[:, ::-1]) * random.uniform(50, 500, (3, 1))
+    place = LENS.directions(random.uniform(0, SIZE, (3, 2))[:, ::-1]) * random.uniform(
+        50, 500, (3, 1)
+    )
     radius = random.uniform(0.01, 0.2, 3) * norm(place)
     along = np.einsum("hwx,kx->hwk", directions, place)
     miss = np.sqrt(np.maximum((place**2).sum(axis=1) - along**2, 0))
