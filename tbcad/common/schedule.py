@@ -67,7 +67,8 @@ PATIENCE = 30.0  # seconds without any worker
 _CONNECT_TIMEOUT = 10.0  # seconds
 _CHECK_INTERVAL = 2.0  # seconds between checks for workers
 _MAX_GREETING = 1_000_000  # bytes; a scheduler's greeting has some hundred
-_SCHEMES = ("tcp", "tls", "ws", "wss")
+_ENCRYPTED = ("tls", "wss")
+_SCHEMES = ("tcp", "ws", *_ENCRYPTED)
 _PACKAGES = ("numpy", "scipy", "numba")  # packages whose version may change a figure
 
 
@@ -251,6 +252,8 @@ def _cluster(address: str, patience: float) -> Iterator[Any]:
     """A client of the scheduler, once it has a worker."""
     from distributed import Client
 
+    if urlsplit(address).scheme in _ENCRYPTED:
+        _check_certificates(address)
     try:
         _check_greeting(address)
         client = Client(address, timeout=_CONNECT_TIMEOUT, name="tbcad")
@@ -265,6 +268,22 @@ def _cluster(address: str, patience: float) -> Iterator[Any]:
         except TimeoutError:
             raise _no_workers(address, patience) from None
         yield client
+
+
+def _check_certificates(address: str) -> None:
+    """Raise an InputError where dask's configuration has none, or some that cannot be read."""
+    from distributed import Security
+
+    wrong = "are not there"
+    try:
+        if Security().get_connection_args("client")["ssl_context"]:
+            return
+    except OSError as error:  # of ssl, too
+        wrong = f"cannot be read ({error.strerror or error})"
+    raise InputError(
+        f"--scheduler {address}: certificates of dask's configuration {wrong}: set DASK_DISTRIBUTED"
+        "__COMM__TLS__CA_FILE, and __CLIENT__CERT and __CLIENT__KEY likewise, to PEM files"
+    )
 
 
 def _check_greeting(address: str) -> None:

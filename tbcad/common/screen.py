@@ -22,6 +22,7 @@ BAR_WIDTH = 12
 # The pace of this computer is taken from the stages done, and from this share of all of them as if
 # it had been done at the expected pace: the first short stages say little of the others.
 PRIOR_SHARE = 0.1
+PAUSE_S = 30.0  # without a plain line, before a step is worth one
 
 
 def report_console() -> Console:
@@ -92,7 +93,7 @@ class Stages:
         total = expected if isinstance(expected, int) else sum(expected.values())
         self._bar, self._silent = bar, silent
         self._task = bar.add_task("", total=total, left=self._left or "") if bar else None
-        self._started = monotonic()
+        self._started = self._printed = monotonic()
         self._stage = ""
 
     def stage(self, text: str) -> None:
@@ -108,13 +109,16 @@ class Stages:
         self._stage = text
 
     def _print(self, text: str) -> None:
+        self._printed = monotonic()
         if not self._silent:
-            print(f"[{monotonic() - self._started:3.0f} s] {text}", file=sys.stderr, flush=True)
+            print(f"[{self._printed - self._started:3.0f} s] {text}", file=sys.stderr, flush=True)
 
     def detail(self, text: str) -> None:
-        """Show a step of the stage, on a terminal only."""
+        """Show a step of the stage; without a terminal only where no line came for some time."""
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, description=f"{self._stage}: {text}")
+        elif monotonic() - self._printed > PAUSE_S:
+            self._print(f"{self._stage}: {text}")
 
     def note(self, text: str) -> None:
         """Print a line that stays."""

@@ -81,9 +81,9 @@ class TestThreads:
 class Cluster:
     """A scheduler and its workers, each a process."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *options: str) -> None:
         pytest.importorskip("distributed")
-        self.folder, file = folder, folder / "scheduler.json"
+        self.folder, self.options, file = folder, options, folder / "scheduler.json"
         self.scheduler = self._started("scheduler", "--port", "0", "--scheduler-file", str(file))
         self.workers: list[subprocess.Popen[bytes]] = []
         until(lambda: file.exists() and bool(file.read_text()))
@@ -104,9 +104,9 @@ class Cluster:
             process.wait()
 
     def _started(self, kind: str, *options: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "dask", kind, "--host", HOST, "--no-dashboard", *options]
+        command = [sys.executable, "-m", "dask", kind, "--host", HOST, "--no-dashboard"]
         return subprocess.Popen(
-            command,
+            [*command, *options, *self.options],
             cwd=self.folder,  # which Python's -m would look into first: not that of the tests
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -245,6 +245,28 @@ class TestCluster:
         assert run_units(work, [3], standing.address) == [drawn(3)]  # one of its own
         assert len(opened) == 2
 
+    @pytest.mark.slow
+    def test_by_tls(self, tmp_path: Path) -> None:
+        dask = pytest.importorskip("distributed").client.dask
+        cert, key = (str(tmp_path / name) for name in ("cert.pem", "key.pem"))
+        subject = ("-subj", "/CN=tbcad", "-addext", f"subjectAltName=IP:{HOST}")
+        new = ("-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key, "-out", cert, *subject)
+        subprocess.run(["openssl", "req", *new], check=True, capture_output=True)
+        files = ("--tls-ca-file", cert, "--tls-cert", cert, "--tls-key", key)
+        wanted = {"ca-file": cert, "client.cert": cert, "client.key": key}
+        with dask.config.set(
+            {f"distributed.comm.tls.{name}": file for name, file in wanted.items()}
+        ):
+            cluster = Cluster(tmp_path, "--protocol", "tls", *files)
+            try:
+                cluster.start(1)
+                assert cluster.address.startswith("tls://")
+                assert run_units(sent_by_value(), range(3), cluster.address) == [
+                    *map(drawn, range(3))
+                ]
+            finally:
+                cluster.stop()
+
     def test_what_fails_in_a_command_closes_its_connection(self, standing: Cluster) -> None:
         with pytest.raises(KeyError), one_client(standing.address) as client:
             raise KeyError
@@ -301,7 +323,21 @@ class TestBackground:
             submit(die)
 
 
+TLS = "DASK_DISTRIBUTED__COMM__TLS__"
+
+
 class TestRefused:
+    @pytest.mark.parametrize("address", ["tls://127.0.0.1:8786", "wss://127.0.0.1:8786"])
+    def test_without_certificates(self, address: str) -> None:
+        dask = pytest.importorskip("distributed").client.dask
+        with dask.config.set({"distributed.comm.tls.ca-file": None}):
+            assert f"certificates of dask's configuration are not there: set {TLS}CA_FILE" in (
+                refusal(drawn, [1], address)
+            )
+        names = ("ca-file", "client.cert", "client.key")
+        with dask.config.set({f"distributed.comm.tls.{name}": "nowhere.pem" for name in names}):
+            assert "cannot be read (No such file or directory)" in refusal(drawn, [1], address)
+
     def test_without_dask(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "distributed", None)
         assert "pip install 'tbcad[cluster]'" in refusal(drawn, [1], "tcp://host:8786")

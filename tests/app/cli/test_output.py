@@ -104,6 +104,16 @@ def test_piped_stages_are_lines_with_seconds(capsys: pytest.CaptureFixture[str])
     assert (shown.out, shown.err) == ("", "[  0 s] a\n[  0 s] margin\n")
 
 
+def test_a_long_stage_tells_its_steps_in_plain_lines(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tbcad.common.screen.PAUSE_S", -1.0)
+    with stages({"a": 1}) as screen:
+        screen.stage("a")
+        screen.detail("2 of 3")
+    assert capsys.readouterr().err == "[  0 s] a\n[  0 s] a: 2 of 3\n"
+
+
 ON_A_TERMINAL = """
 import time
 from tbcad.common.screen import stages
