@@ -10,6 +10,7 @@ import os
 import pickle
 import platform
 import socket
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -209,12 +210,17 @@ def _on_worker(
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep distributed's log, which reports lost connections in many lines, off the screen."""
+    """Keep distributed's log and advice, in many lines, off the screen.
+
+    The log reports lost connections; the advice is for tasks of more than 10 MB, as `shared` is.
+    """
     log = logging.getLogger("distributed")
     level = log.level
     log.setLevel(logging.CRITICAL)
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Sending large graph")
+            yield
     finally:
         log.setLevel(level)
 

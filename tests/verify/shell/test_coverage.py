@@ -41,7 +41,7 @@ def measured(mesh: Mesh, pinhole: np.ndarray, coat: float = 0.0) -> tuple[float,
         pinhole, found.fits.surfaces.take(np.flatnonzero(found.mirror)).coated(coat)
     )
     fitted = reflect_on_fits(outline, seen)
-    facets = reflect_on_facets(outline, pinhole, build_scene(mesh).planes)
+    facets = reflect_on_facets(outline, pinhole, build_scene(mesh))
     u = unit(np.array([0.0, 0, 1]))[:, None]
     return (
         2 * minimum_miss_distance(outline, facets, ONE)[0],

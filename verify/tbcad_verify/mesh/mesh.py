@@ -14,6 +14,8 @@ from tbcad_verify.mesh.vectors import cross, norm
 from tbcad_verify.types import Floats
 
 Ints = NDArray[np.int32]
+# Of each coordinate: the factor of its bits, and by how much those before it are mixed.
+HASH = ((0x9E3779B97F4A7C15, 1), (0xC2B2AE3D27D4EB4F, 29), (0x165667B19E3779F9, 32))
 
 
 @dataclass(frozen=True)
@@ -64,15 +66,14 @@ def indexed_mesh(points: Floats, faces: Ints) -> Mesh:
 
 def join_meshes(meshes: list[Mesh]) -> Mesh:
     """Several meshes as one, in order, sharing nothing."""
-    vertices = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
-    edges = np.cumsum([0, *(mesh.twin.size for mesh in meshes)])
-    twins = [np.where(m.twin < 0, -1, m.twin + e) for m, e in zip(meshes, edges, strict=False)]
+    # As wide as indices are: wider sums of millions would be the most memory of a verification.
+    vertices = np.cumsum([0, *(len(mesh.points) for mesh in meshes)], dtype=np.int32)
+    edges = np.cumsum([0, *(mesh.twin.size for mesh in meshes)], dtype=np.int32)
+    twins = [np.where(m.twin < 0, m.twin, m.twin + e) for m, e in zip(meshes, edges, strict=False)]
     return Mesh(
         np.concatenate([mesh.points for mesh in meshes]),
-        np.concatenate([m.faces + v for m, v in zip(meshes, vertices, strict=False)]).astype(
-            np.int32
-        ),
-        np.concatenate(twins).astype(np.int32),
+        np.concatenate([m.faces + v for m, v in zip(meshes, vertices, strict=False)]),
+        np.concatenate(twins),
         np.concatenate([mesh.area for mesh in meshes], axis=1),
     )
 
@@ -134,10 +135,12 @@ def sorted_unique(keys: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _unique_rows(rows: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     # Sorting one 64-bit hash is many times faster than sorting triples; a clash is checked for.
-    bits = (rows + np.float32(0)).view(np.uint32).astype(np.uint64)  # -0 becomes +0
-    key = bits[:, 0] * np.uint64(0x9E3779B97F4A7C15)
-    key = (key ^ (key >> np.uint64(29))) + bits[:, 1] * np.uint64(0xC2B2AE3D27D4EB4F)
-    key = (key ^ (key >> np.uint64(32))) + bits[:, 2] * np.uint64(0x165667B19E3779F9)
+    # One column after the other, in place: the most memory of a verification is here.
+    key = np.zeros(len(rows), dtype=np.uint64)
+    for k, (factor, shift) in enumerate(HASH):
+        bits = (rows[:, k] + np.float32(0)).view(np.uint32).astype(np.uint64)  # -0 becomes +0
+        key ^= key >> np.uint64(shift)
+        key += np.multiply(bits, np.uint64(factor), out=bits)
     first = _first_equal(key)
     if not np.array_equal(rows[first], rows):
         _, index, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)
@@ -160,13 +163,17 @@ def _first_equal(keys: NDArray[np.uint64]) -> NDArray[np.intp]:
 def _edge_keys(faces: Ints, count: int) -> NDArray[np.int64]:
     start = faces.ravel().astype(np.int64)
     end = np.roll(faces, -1, axis=1).ravel().astype(np.int64)
-    return np.minimum(start, end) * count + np.maximum(start, end)
+    keys = np.minimum(start, end)
+    keys *= count
+    keys += np.maximum(start, end, out=end)
+    return keys
 
 
 def _twins(faces: Ints, count: int) -> Ints:
     keys = _edge_keys(faces, count)
     order = np.argsort(keys)
-    same = keys[order][1:] == keys[order][:-1]
+    ordered = keys[order]
+    same = ordered[1:] == ordered[:-1]
     alone = same & ~np.append(same[1:], False) & ~np.insert(same[:-1], 0, False)
     first, second = order[:-1][alone], order[1:][alone]
     twin = np.full(keys.size, -1, dtype=np.int32)

@@ -38,6 +38,10 @@ class RayScene:
     embree: Any  # the committed scene; queries release the interpreter's lock
     planes: Floats  # (F, 4) unit outward normal and its product with a corner, mm
 
+    def plane(self, facet: NDArray[np.integer]) -> Floats:
+        """(4, N) planes of facets (N,); of -1 any."""
+        return np.take(self.planes, facet, axis=0).T
+
     def first(self, start: Floats32, d: Floats32) -> Ints:
         """(N,) the first facet along rays from (N, 3) along (N, 3); -1 for none."""
         return np.asarray(self.embree.run(start, d), dtype=np.int32)
@@ -51,16 +55,23 @@ class ImagePairScene(RayScene):
     meets the mesh. A ray passes the plane once: what it meets on the side where it starts is first.
     """
 
-    side: float  # 1 where the mesh has x >= 0, -1 where it has x <= 0
+    # 1 where the mesh has x >= 0, -1 where it has x <= 0; planes are the mesh's alone
+    side: float
+
+    def plane(self, facet: NDArray[np.integer]) -> Floats:
+        """(4, N) planes of facets (N,); of -1 any."""
+        plane = super().plane(facet % len(self.planes))
+        plane[0] *= np.where(facet < len(self.planes), 1.0, -1.0)
+        return plane
 
     @property
     def mesh(self) -> RayScene:
         """The mesh alone, which rays from its side meet before the image."""
-        return RayScene(self.embree, self.planes[: len(self.planes) // 2])
+        return RayScene(self.embree, self.planes)
 
     def first(self, start: Floats32, d: Floats32) -> Ints:
         """(N,) the first facet along rays from (N, 3) along (N, 3); -1 for none."""
-        half = np.int32(len(self.planes) // 2)
+        half = np.int32(len(self.planes))
         beyond = self.side * start[:, 0] < 0
         start, d = (_flipped(rays, beyond) for rays in (start, d))
         facet = super().first(start, d)
@@ -99,8 +110,7 @@ def with_image(scene: RayScene, mesh: Mesh) -> RayScene | None:
     side = 1.0 if x.min() >= 0 else -1.0
     if side * x.min() < 0 or side * x.max() < 0:
         return None
-    planes = np.concatenate([scene.planes, scene.planes * [-1, 1, 1, 1]])
-    return ImagePairScene(scene.embree, planes, side)
+    return ImagePairScene(scene.embree, scene.planes, side)
 
 
 def first_hits(scene: RayScene, origin: Floats, d: Floats) -> Ints:
@@ -112,7 +122,7 @@ def first_hits(scene: RayScene, origin: Floats, d: Floats) -> Ints:
 
 def distances_to_planes(scene: RayScene, facet: Ints, origin: Floats, d: Floats) -> Floats:
     """(N,) lengths of d from origin to the planes of facets, in float64."""
-    plane = np.take(scene.planes, facet, axis=0).T
+    plane = scene.plane(facet)
     return np.asarray((plane[3] - dot(origin, plane[:3])) / dot(d, plane[:3]))
 
 

@@ -133,18 +133,8 @@ def _verify_shells(
     facets.clear()  # half of the memory
 
     sink(Results(stages=[PRINTABILITY]))
-    measured: dict[str, PartMeasures] = {}
-    # The scene of a shell whose image is another: one for its walls and for all light.
-    has_image = any(shell.image_of for shell in shells)
-    mesh = shells[0].mesh if has_image else None
-    first = attempt(partial(build_scene, mesh))[0] if mesh else None
-    for shell in shells:
-        measures, lost = attempt(partial(_shell_measures, shell, measured, first))
-        if measures:
-            measured[shell.part.name] = measures
-        _assess_printing(shell.part.stl, measures, lost, profiles, required, sink)
+    first, holes = _print_shells(shells, profiles, required, sink)
     if shells:
-        holes = {name: measures.holes for name, measures in measured.items()}
         known = _trace_shells(export, shells, first, holes, sink)
         if cutter_mm is not None:
             names = [("fillet width", part.stl, "um") for part in export.parts]
@@ -152,6 +142,25 @@ def _verify_shells(
             sink(Results(checks=fillets))
         _verify_mandrels(export, negatives, known, cutter_mm, sink)
         _verify_lamps(export, rings, known, profiles, required, sink)
+
+
+def _print_shells(
+    shells: Sequence[ShellPart], profiles: list[Profile], required: bool, sink: ResultSink
+) -> tuple[RayScene | None, dict[str, RoundHoles]]:
+    """Assess all shells as parts.
+
+    Returns the scene of one whose image is another, for its walls and for all light; and the holes
+    of each, by its name.
+    """
+    measured: dict[str, PartMeasures] = {}
+    mesh = shells[0].mesh if any(shell.image_of for shell in shells) else None
+    first = attempt(partial(build_scene, mesh))[0] if mesh else None
+    for shell in shells:
+        measures, lost = attempt(partial(_shell_measures, shell, measured, first))
+        if measures:
+            measured[shell.part.name] = measures
+        _assess_printing(shell.part.stl, measures, lost, profiles, required, sink)
+    return first, {name: measures.holes for name, measures in measured.items()}
 
 
 def _verify_mandrels(
@@ -300,10 +309,8 @@ def _trace_shells(
 
 
 def _set_up(export: Export, shells: list[ShellPart], first: RayScene | None) -> OpticalSetup:
-    return set_up(
-        export,
-        [require(shell.mesh, shell.reason) for shell in shells],
-        [require(shell.recovery, shell.reason) for shell in shells],
-        any(shell.image_of for shell in shells),
-        first,
-    )
+    meshes = [require(shell.mesh, shell.reason) for shell in shells]
+    recoveries = [require(shell.recovery, shell.reason) for shell in shells]
+    has_image = any(shell.image_of for shell in shells)
+    shells.clear()  # from here they are one mesh: half of the memory
+    return set_up(export, [meshes.pop(0) for _ in recoveries], recoveries, has_image, first)

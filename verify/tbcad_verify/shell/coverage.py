@@ -79,7 +79,7 @@ def measure(setup: OpticalSetup) -> Coverage:
     ]
     pairs = list(zip(cameras, outlines, strict=True))
     fitted = [reflect_on_fits(outline, setup.seen(camera)) for camera, outline in pairs]
-    facet = [reflect_on_facets(o, camera.pinhole, setup.scene.planes) for camera, o in pairs]
+    facet = [reflect_on_facets(o, camera.pinhole, setup.scene) for camera, o in pairs]
     turned = np.abs(
         sum(winding_numbers(o, at, virtual, u) for o, at in zip(outlines, fitted, strict=True))
     )

@@ -117,7 +117,7 @@ def _spread(
     sensor: SensorScene, facet: NDArray[np.int32], d: Floats, toward: Floats, miss: Floats
 ) -> NDArray[np.float32]:
     """Distance at the object, across the fitted ray, of the ray off the facet's plane."""
-    plane = np.take(sensor.setup.scene.planes, facet, axis=0).T
+    plane = sensor.setup.scene.plane(facet)
     pinhole = sensor.camera.pinhole[:, None]
     t = (plane[3] + sensor.setup.export.coating_mm - dot(pinhole, plane[:3])) / dot(d, plane[:3])
     point, bounced = pinhole + t * d, reflect_directions(d, plane[:3])

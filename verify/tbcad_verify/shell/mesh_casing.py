@@ -194,6 +194,6 @@ def _back(setup: OpticalSetup, valleys: Valleys, camera: Camera) -> Floats:
     start = valleys.point[:, valleys.inner]
     direction = unit(unit(start) + unit(start - camera.pinhole[:, None]))
     facet = first_hits(setup.scene, start + LIFT_MM * direction, direction)
-    square = dot(np.take(setup.scene.planes[:, :3], facet, axis=0).T, direction) > SQUARE_COS
+    square = dot(setup.scene.plane(facet)[:3], direction) > SQUARE_COS
     corners = np.unique(setup.mesh.faces[facet[(facet >= 0) & square]])
     return np.ascontiguousarray(setup.mesh.points[corners].T)

@@ -97,7 +97,7 @@ class OpticalSetup:
         pair = self.scene
         if not isinstance(pair, ImagePairScene) or pair.side * camera.pinhole[0] < 0:
             return pair
-        has_none = (owner[len(pair.planes) // 2 :] < 0).all()
+        has_none = (owner[len(pair.planes) :] < 0).all()
         return pair.mesh if has_none else pair
 
     def names(self, facets: NDArray[np.integer]) -> list[str]:
@@ -137,11 +137,12 @@ def set_up(
 
     `first`: of the first part's mesh; None: the second is put into Embree too.
     """
+    pair = with_image(first, meshes[0]) if first and second_is_image else None
     mesh, recovery = join_meshes(meshes), join_recoveries(recoveries)
+    del meshes  # half of the memory, where the caller keeps none
     counts = [item.segments.count for item in recoveries]
     part = np.repeat(np.arange(len(counts)), counts)
     camera = np.array([item.camera for item in export.parts])[part]
-    pair = with_image(first, meshes[0]) if first and second_is_image else None
     scene = pair or build_scene(mesh)
     seen = _patches_at_apices(export, scene, recovery, camera)
     matches = match(export.mirrors, recovery, mesh, camera, seen, export.coating_mm)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tbcad_verify.mesh.fits import SurfaceFits
 from tbcad_verify.mesh.mesh import Mesh
+from tbcad_verify.mesh.rays import RayScene
 from tbcad_verify.mesh.surfaces import (
     PreparedSurfaces,
     ReflectedRays,
@@ -82,10 +83,10 @@ def trace_outline(
     )
 
 
-def reflect_on_facets(outline: Outline, pinhole: Floats, planes: Floats) -> ReflectedRays:
-    """Reflect each sample's ray on its facet's own normal; planes (F, 4) as in `rays.Scene`."""
+def reflect_on_facets(outline: Outline, pinhole: Floats, scene: RayScene) -> ReflectedRays:
+    """Reflect each sample's ray on its facet's own normal."""
     d = outline.point - pinhole[:, None]
-    normal = planes[outline.facet, :3].T
+    normal = scene.plane(outline.facet)[:3]
     return ReflectedRays(outline.point, reflect_directions(d, normal), np.ones(d.shape[1]))
 
 
