@@ -45,7 +45,8 @@ def test_an_image_is_met_as_if_it_were_in_embree(side: float) -> None:
     both = build_scene(join_meshes([mesh, flipped_mesh(mesh)]))
     pair = with_image(build_scene(mesh), mesh)
     assert pair is not None
-    np.testing.assert_allclose(pair.planes, both.planes, atol=1e-12)
+    every = np.arange(600)
+    np.testing.assert_allclose(pair.plane(every), both.plane(every), atol=1e-12)
     origin, d = 2 * random.normal(size=(3, 5000)), random.normal(size=(3, 5000))
     facet = first_hits(both, origin, d)
     np.testing.assert_array_equal(first_hits(pair, origin, d), facet)

@@ -57,6 +57,20 @@ def test_what_is_no_shell_is_unknown(text: str) -> None:
         read_solids(text.replace("PRODUCT(", "PRODUCTS("))
 
 
+@pytest.mark.parametrize(
+    ("claimed", "allowed"), [("2.E-06", True), ("1.E-05", False), ("12345.E-07", False)]
+)
+def test_what_a_file_claims_to_be_true_to(text: str, claimed: str, allowed: bool) -> None:
+    """A carrier of n = 60 says 2 nm; nothing may say more than gaps may be."""
+    vague = text.replace("LENGTH_MEASURE(1.E-06)", f"LENGTH_MEASURE({claimed})")
+    assert vague != text
+    if allowed:
+        assert list(read_solids(vague)) == ["shell_a"]
+    else:
+        with pytest.raises(Unknown, match="UNCERTAINTY_MEASURE_WITH_UNIT"):
+            read_solids(vague)
+
+
 def test_faces_of_one_hole_are_counted_once_and_of_two_twice() -> None:
     """Half shells of one bore, and a second bore on the same axis beyond a gap."""
 
