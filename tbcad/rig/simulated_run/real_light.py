@@ -77,19 +77,21 @@ class RealFrame:
         near = maximum_filter(shown.reshape(self.directions.shape[:2]), REACH)
         light = np.zeros(self.directions.shape, dtype=np.float32)
         light[near] = ball_light(self.view, scene, self.optics, np.flatnonzero(near))
-        return self._veiled(light)
+        return self._veiled(light, self.optics.kernel(self.view.pitch))
 
     def led_images(
         self, occluders: Occluders, dome: float, brightness: Floats, faint: float
     ) -> list[Signal]:
         """Images (h, w) of LEDs with domes (mm) that fill pixels so far, (l,)."""
         points = self.led_points(occluders, dome, faint)
-        images = []
+        kernel = pixel_kernel(self.optics.lens.cutoff(self.view.pitch), PLACES)
+        factors, images = kernel_factors(kernel), []
+        factors[:, :-1] *= PLACES
         for led, bright in enumerate(brightness.tolist()):
             image = np.zeros((*self.directions.shape[:2], 1), dtype=np.float32)
             pixel, area = points.of(led)
-            self._add(image[..., 0], pixel, bright * area)
-            images.append(self._veiled(image)[..., 0])
+            _add_spread(image[..., 0], pixel, bright * area, factors, PLACES, KERNEL_PX)
+            images.append(self._veiled(image, kernel)[..., 0])
         return images
 
     def led_points(self, occluders: Occluders, dome: float, faint: float) -> LightPoints:
@@ -105,15 +107,8 @@ class RealFrame:
         led, pixel, area = (np.concatenate(one) for one in zip(*found, strict=True))
         return LightPoints(led, pixel, area / len(every))
 
-    def _add(self, image: Signal, pixel: Floats, light: Floats) -> None:
-        kernel = pixel_kernel(self.optics.lens.cutoff(self.view.pitch), PLACES)
-        factors = kernel_factors(kernel)
-        factors[:, :-1] *= PLACES
-        _add_spread(image, pixel, light, factors, PLACES, KERNEL_PX)
-
-    def _veiled(self, light: Signal) -> Signal:
-        ball, share = self.veil
-        return with_scatter(with_halo(light, self.optics.kernel(self.view.pitch)), ball, share)
+    def _veiled(self, light: Signal, kernel: Floats) -> Signal:
+        return with_scatter(with_halo(light, kernel), *self.veil)
 
 
 def between(directions: Floats, places: Floats) -> Floats:
