@@ -12,6 +12,7 @@ import typer
 from tbcad.common.screen import Stages
 from tbcad.errors import InputError
 from tbcad.options.call import Call
+from tbcad.options.captures import Optics
 from tbcad.options.shared import (
     AnyPath,
     CalibrationFolder,
@@ -27,6 +28,7 @@ from tbcad.options.shared import (
     RunFolder,
     UnitOption,
     UpOption,
+    exposures,
     numbers,
 )
 
@@ -150,7 +152,28 @@ class SimulateRunOptions(Call):
     exposure_leds: ExposureLeds[str | float] = None
     exposure_lit: ExposureLit[str | float] = None
     perfect: bool = False
-    """A build without errors that gravity does not turn, before an ideal lens."""
+    """A build without errors that gravity does not turn, before a lens without distortion."""
+    optics: Optics = "ideal"
+    """ideal: a pinhole, spread by an even blur, and no cast shadow. real: object and highlights
+    through lens and pupil of camera.json, shadows of the lamps, what balls scatter, as in tbcad
+    capture --optics real; dust, hot pixels, noise and errors of the build in both."""
+    gloss: Annotated[float | None, typer.Option(min=0.05, max=1, metavar="ROUGHNESS")] = None
+    """With --optics real: the object's roughness, from 0.05 (polished) to 1; by default it is
+    matt."""
+
+    def check(self) -> None:
+        """Refuse options that exclude each other, and numbers that are none.
+
+        InputError: which, and what is allowed.
+        """
+        if self.bits not in (8, 16):
+            raise InputError(f"--bits {self.bits} is not written: allowed is 8 or 16")
+        if self.gloss is not None and self.optics == "ideal":
+            raise InputError("--gloss is of --optics real: add that, or leave it out")
+        if self.gloss is not None and "lit" not in (self.phase_names() or ("lit",)):
+            raise InputError("--gloss is seen in phase lit alone: add it to --phases, or leave it")
+        self.stop_numbers()
+        exposures(self.exposure_leds, self.exposure_lit)
 
     def stop_numbers(self) -> tuple[int, ...] | None:
         """The stops; None for all; InputError: they are no list of numbers."""

@@ -15,12 +15,13 @@ import math
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from tbcad.cad.formats.checked_files import Finite
 from tbcad.errors import InputError
+from tbcad.records.camera_sheet import RealOpticsRecord
 from tbcad.records.document import Document, RecordSection
 
 PHOTOGRAPHS = "photographs"
@@ -155,6 +156,7 @@ class RunRecord(Document):
         seconds: expected duration of the whole run.
         geometry: "prototype": one camera before balls on a base took all; "shell": frames with the
             object turned are camera b's, which has the object before it that way.
+        real: lens and mirrors of a simulated run with --optics real; not there of any other.
     """
 
     MISSING: ClassVar[str] = "name a folder that tbcad run or simulate-run wrote"
@@ -170,6 +172,12 @@ class RunRecord(Document):
     exposures: dict[PhaseName, PhaseExposure] = Field(default_factory=dict)
     seconds: float = Field(ge=0)
     geometry: Geometry = "prototype"
+    real: RealOpticsRecord | None = None
+
+    def document(self) -> dict[str, Any]:
+        """The JSON object."""
+        found = super().document()
+        return found if self.real else {key: found[key] for key in found if key != "real"}
 
     @model_validator(mode="after")
     def _nothing_twice(self) -> "RunRecord":

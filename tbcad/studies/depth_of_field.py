@@ -1,6 +1,6 @@
 """Depth of the mirrors' virtual images, and the stop that a real lens would need (section 6)."""
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -18,7 +18,10 @@ from tbcad.core.camera.requirements import (
     virtual_images,
 )
 from tbcad.core.spec.design import Spec
+from tbcad.light.simulate.capture.photograph import count_pixels, virtual_cameras
 from tbcad.studies.paper import claimed, claims, notes, try_design, with_lens_of_table_i
+from tbcad.studies.resolution import default_sensors, pixel_pitch
+from tbcad.studies.resolved import ResolvedSpots, spot_mm
 from tbcad.types import Floats, Progress
 
 RULES = ("traced", "paper", "flat")
@@ -27,6 +30,10 @@ NUMBERS = (
     *("polar_deg", "radius_mm", "incidence_deg", "to_mirror_mm"),
     *(f"{point}_mm" for point in POINTS),
     *(f"{point}_depth_mm" for point in POINTS),
+)
+PUPILS = (
+    *("radii", "width_px", "height_px", "best_pupil_mm", "average_px", "resolved_average_spots"),
+    *("ideal_spot_mm", "real_spot_mm"),
 )
 CONSTANT = "camera to images of the centre, flat radii: farthest less nearest"
 PAPER_RANGE = "the paper's distances"
@@ -69,11 +76,18 @@ def depth_of_field(spec: Spec, options: LensOptions, progress: Progress = lambda
     by_rule, refusals = _by_rule(spec, progress)
     ranges = _ranges(by_rule)
     stops = _stop_records(ranges, lens, options.blur_px)
+    pupils = _pupil_records(spec, by_rule, progress)
     tables = (
         _mirror_table(by_rule, (*notes("depth-of-field"), *refusals)),
         Table.of_records("depth-of-field-stops", stops, notes("depth-of-field-stops")),
+        Table.of_records("depth-of-field-pupils", pupils, notes("depth-of-field-pupils"), PUPILS),
     )
-    figures = (*_image_figures(by_rule), *_flat_figures(by_rule, ranges), *_stop_figures(stops))
+    figures = (
+        *_image_figures(by_rule),
+        *_flat_figures(by_rule, ranges),
+        *_stop_figures(stops),
+        *_pupil_figures(pupils),
+    )
     panels = (_image_panel(by_rule), _blur_panel(ranges, lens))
     return Study("depth-of-field", figures, tables, panels)
 
@@ -132,6 +146,29 @@ def _stop_records(ranges: dict[str, DepthRange], lens: Lens, blur_px: float) -> 
         for name, over in ranges.items()
         for kind, stop in aperture_stops(lens, over, blur_px).items()
     ]
+
+
+def _pupil_records(
+    spec: Spec, by_rule: dict[str, VirtualImages], progress: Progress
+) -> list[Record]:
+    """For each radius rule and sensor, the pupil with the most resolvable spots."""
+    capture, records = spec.optics.capture_diameter_mm, []
+    for rule, images in by_rule.items():
+        cameras = virtual_cameras(images.array)
+        for sensor in default_sensors(spec):
+            progress(f"pupils, {rule} radii, {sensor}")
+            seen = count_pixels(images.array, sensor, capture / 2).seen
+            real = ResolvedSpots(images, seen, pixel_pitch(images.array.camera, sensor))
+            ideal, spots = (2 * float(each.sum()) / cameras for each in (seen, real.spots))
+            widths = spot_mm(capture, ideal), spot_mm(capture, spots)
+            figures = (rule, *astuple(sensor), real.best_pupil, ideal, spots, *widths)
+            records.append(dict(zip(PUPILS, figures, strict=True)))
+    return records
+
+
+def _pupil_figures(pupils: list[Record]) -> list[Figure]:
+    name = "pupil with the most spots, {width_px}x{height_px}, {radii} radii"
+    return [Figure(name.format(**one), "mm", one["best_pupil_mm"]) for one in pupils]
 
 
 def _image_figures(by_rule: dict[str, VirtualImages]) -> list[Figure]:

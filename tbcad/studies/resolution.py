@@ -7,8 +7,10 @@ import numpy as np
 
 from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.common.schedule import run_units
+from tbcad.core.camera.requirements import virtual_images
 from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.mirrors.array import numbered_directions
+from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
 from tbcad.light.simulate.capture.photograph import (
@@ -30,17 +32,24 @@ from tbcad.studies.paper import (
     try_design,
     with_lens_of_table_i,
 )
+from tbcad.studies.resolved import ResolvedSpots, spot_mm
 from tbcad.types import Floats, Progress
 
 MULTIPLES = (0.5, 1, 2, 4)  # of the sides of the design's sensor: those of Table II
 COUNTED = (
     *("virtual_cameras", "seeing_px", "on_mirrors_px", "seeing_average_px"),
     *("on_mirrors_average_px", "frame_filled", "rays_traced"),
+    *("best_pupil_mm", "resolved_average_spots", "ideal_spot_mm", "real_spot_mm"),
 )
 # From the vertical toward the object: the counts of apices in the frame of a camera that is turned
 # so come nearest to the second column of Table II. The paper does not state where its cameras look.
 PITCH_DEG = 17.86
-KINDS = {"seeing": "seeing_average_px", "on mirrors": "on_mirrors_average_px"}
+KINDS = {
+    "seeing": "seeing_average_px",
+    "on mirrors": "on_mirrors_average_px",
+    "resolved by a real lens": "resolved_average_spots",
+}
+LINES = dict(zip(KINDS, ("o-", "x--", "^:"), strict=True))
 
 
 @dataclass(frozen=True)
@@ -128,19 +137,30 @@ def resolution(
 
 def _counts(spec: Spec, sensors: tuple[Sensor, ...], n: int) -> list[Record]:
     """One n: a row for every sensor, or what a refusal says."""
-    attempt, radius = try_design(spec, optics={"n": n}), spec.optics.capture_diameter_mm / 2
+    capture = spec.optics.capture_diameter_mm
+    attempt, radius = try_design(spec, optics={"n": n}), capture / 2
     heads: list[Record] = [{"n": n, **asdict(sensor)} for sensor in sensors]
     if attempt.array is None:
         return [{**head, **dict.fromkeys(COUNTED), "reason": attempt.reason} for head in heads]
-    cameras = virtual_cameras(attempt.array)
+    cameras, images = virtual_cameras(attempt.array), virtual_images(attempt.array, radius)
     rows: list[Record] = []
     for head, sensor in zip(heads, sensors, strict=True):
         one = count_pixels(attempt.array, sensor, radius)
         # Both cameras' pictures are mirror images, pixel by pixel.
         seeing, on = 2 * float(one.seen.sum()), 2 * float(one.on.sum())
-        figures = (cameras, seeing, on, seeing / cameras, on / cameras, one.fill, one.rays)
+        real = ResolvedSpots(images, one.seen, pixel_pitch(attempt.array.camera, sensor))
+        average, spots = seeing / cameras, 2 * float(real.spots.sum()) / cameras
+        figures = (
+            *(cameras, seeing, on, average, on / cameras, one.fill, one.rays),
+            *(real.best_pupil, spots, spot_mm(capture, average), spot_mm(capture, spots)),
+        )
         rows.append({**head, **dict(zip(COUNTED, figures, strict=True)), "reason": ""})
     return rows
+
+
+def pixel_pitch(camera: Camera, sensor: Sensor) -> float:
+    """Width of a pixel at unit distance, with another sensor behind the lens of a camera."""
+    return float(2 * np.tan(camera.hfov / 2) / sensor.width_px)
 
 
 def _balance(counts: Table, sensor: Sensor, ratio: Ratio, kind: str) -> Record:
@@ -259,7 +279,7 @@ def _count_panel(counts: Table, sensors: tuple[Sensor, ...]) -> PlotPanel:
 def _balance_panel(balanced: Table, ratios: tuple[Ratio, ...]) -> PlotPanel:
     series = []
     for k, ratio in enumerate(ratios):
-        for kind, style in (("seeing", "o-"), ("on mirrors", "x--")):
+        for kind, style in LINES.items():
             rows = balanced.where(ratio=str(ratio), pixels_counted=kind)
             label, n = f"{ratio}, pixels {kind}", rows.numbers("balanced_n")
             series.append(Series(label, megapixels(rows), n, f"C{k}{style}"))

@@ -104,12 +104,9 @@ def photograph(options: CaptureOptions) -> Photographs:
 
 def _roughness_nm(export: ExportedDesign, options: CaptureOptions) -> list[float] | None:
     """Of each ball of a prototype; None of a shell's mirrors."""
-    if options.geometry != "prototype":
-        return None
-    from tbcad.prototype.balls.catalogue import roughness_rq_nm
-    from tbcad.records.tables import BallRow
+    from tbcad.prototype.balls.catalogue import roughnesses_nm
 
-    return [roughness_rq_nm(ball.grade) for ball in BallRow.read(export.folder)]
+    return roughnesses_nm(export.folder) if options.geometry == "prototype" else None
 
 
 def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict[str, Any]:

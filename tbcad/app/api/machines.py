@@ -22,7 +22,6 @@ from tbcad.options.machines import (
     RunOptions,
     SimulateRunOptions,
 )
-from tbcad.options.shared import exposures
 
 if TYPE_CHECKING:
     from tbcad.rig.calibration.intrinsics.checkerboard import SolvedLens
@@ -59,10 +58,7 @@ def simulate_run(options: SimulateRunOptions) -> Run:
     exports, folder, file = Path(options.exports), Path(options.out), options.object_file
     check_is_export(exports)
     check_is_object(options.object_file, options.up, options.unit)
-    if options.bits not in (8, 16):
-        raise InputError(f"--bits {options.bits} is not written: allowed is 8 or 16")
-    options.stop_numbers()  # refused before what is heavy is loaded
-    exposures(options.exposure_leds, options.exposure_lit)
+    options.check()  # before what is heavy is loaded
     from tbcad.light.simulate.scene.object_from_file import ObjectOptions
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.output.single_files import files_named

@@ -6,12 +6,14 @@ since rays from the rim are counted where waves from it no longer overlap: so ra
 `RAY_SHARE` of the pupil (docs/decisions/0053-real-optics.md; `defocused_mtf` is exact).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.common.compiled import compiled_sum
+from tbcad.core.geometry.vectors import unit
+from tbcad.core.optics.camera import LensCamera, distorted, undistorted
 from tbcad.types import Floats
 
 Signal = NDArray[np.float32]
@@ -38,6 +40,32 @@ class PupilLens:
     def blur_px(self, depth: Floats, pitch: float) -> Floats:
         """Diameter of the blur circle of points at depths (...), mm, in pixels."""
         return self.pupil_mm * np.abs(1 / depth - 1 / self.focus_mm) / pitch
+
+
+@dataclass(frozen=True)
+class PupilCamera(LensCamera):
+    """A camera that sees through one point of its pupil, which is its `pinhole`."""
+
+    aside: Floats = field(default_factory=lambda: np.zeros(2))
+    """The point beside the pupil's middle, along rows and columns, over the depth in focus."""
+
+    def project(self, points: Floats) -> Floats:
+        """As of `LensCamera`: the pixel is that of where the ray meets the plane in focus."""
+        image = (points - self.pinhole) @ self.axes.T
+        place = distorted(image[..., :2] / image[..., 2:] + self.aside, self.distortion)
+        return np.asarray(place * self.focal + self.principal)
+
+    def directions(self, pixels: Floats) -> Floats:
+        """As of `LensCamera`, from the point to what the pixel shows in focus."""
+        place = undistorted((pixels - self.principal) / self.focal, self.distortion) - self.aside
+        return unit(np.append(place, np.ones((*place.shape[:-1], 1)), axis=-1) @ self.axes)
+
+
+def through_pupil(camera: LensCamera, point: Floats, focus: float) -> PupilCamera:
+    """A camera through a point (3,) beside its pinhole, in focus at a depth, mm."""
+    kept = {one.name: getattr(camera, one.name) for one in fields(LensCamera)}
+    kept["pinhole"] = camera.pinhole + point
+    return PupilCamera(**kept, aside=camera.axes[:2] @ point / focus)
 
 
 def pupil_points(fine: int = FINE) -> Floats:

@@ -18,6 +18,10 @@ LEFT_OUT = (
     "printed parts, LEDs and lamps in the picture",
     "dust, hot pixels, errors of form",
 )
+LEFT_OUT_OF_RUNS = (
+    "light of the object that meets two mirrors, light of LEDs on the object",
+    *LEFT_OUT[1:3],
+)
 
 
 def real_optics(

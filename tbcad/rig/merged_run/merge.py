@@ -186,6 +186,7 @@ def _facts(
         "vignetting": "flat field" if options.flat else options.vignetting,
         "encoding": options.encoding,
         "brightness": options.brightness,
+        **({"optics": "real", "real": run.record.real.model_dump()} if run.record.real else {}),
     }
 
 

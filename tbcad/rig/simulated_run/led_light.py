@@ -113,15 +113,18 @@ def led_light(
     occluders: Occluders,
     dome: float = DOME_MM,
     faint: float = FAINT_PX2,
+    reflectance: float = 1.0,
 ) -> LightPoints:
     """All light of the LEDs that reaches the camera over the balls in a frame, from 0.
 
     The object may be turned by 180 degrees; LEDs have domes of a radius in mm. Images of images
-    with less than a faint area, square pixels, are not followed.
+    with less than a faint area, square pixels, are not followed, and are darker than images by the
+    balls' reflectance.
     """
     balls = balls_of_frame(built, frame)
     once = _reflected_once(built, balls, turned, occluders, dome)
     twice = _reflected_twice(built, balls, turned, occluders, (dome, faint))
+    twice = twice._replace(area=reflectance * twice.area)
     return LightPoints(*(np.concatenate(pair) for pair in zip(once, twice, strict=True)))
 
 

@@ -10,6 +10,7 @@ from scipy.ndimage import convolve1d
 
 from tbcad.common.compiled import compiled
 from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
+from tbcad.light.simulate.capture.real import RealOptics
 from tbcad.light.simulate.capture.sensor import (
     Image16,
     PixelMaps,
@@ -24,6 +25,7 @@ from tbcad.light.simulate.parallel import chunks
 from tbcad.light.simulate.prototype.ball_rays import ball_hits, camera_colours
 from tbcad.light.simulate.prototype.run import HALF_TURN, turned_balls
 from tbcad.light.simulate.scene.ray_casting import RAYS_PER_CHUNK, Scene
+from tbcad.records.camera_sheet import RealOpticsRecord
 from tbcad.records.run import DARK, DARK_LIT, LIT, Frame, PhaseTimes
 from tbcad.rig.machine.designed import BuiltPrototype
 from tbcad.rig.simulated_run.led_light import (
@@ -34,6 +36,7 @@ from tbcad.rig.simulated_run.led_light import (
     led_light,
 )
 from tbcad.rig.simulated_run.pixel_blocks import PixelBlocks, boxes_about, pixel_blocks
+from tbcad.rig.simulated_run.real_light import RealFrame
 from tbcad.types import Colours, Floats
 
 EXPOSURE_S = 1.0  # in which LEDs and object give the light that follows
@@ -70,6 +73,9 @@ class ImagingChain:
     object_light: float = OBJECT_LIGHT  # of the lit object where it is white, likewise
     # of exposure; `EXPOSURE_S` where they are not said
     times: PhaseTimes = field(default_factory=PhaseTimes)
+    # lens and mirrors, in place of the spread; None: a pinhole before it. Noise is the sensor's
+    real: RealOptics | None = None
+    told: RealOpticsRecord | None = None  # what a record says of it
 
     def exposure(self, phase: str) -> float:
         """Exposure time of a phase over `EXPOSURE_S`."""
@@ -106,10 +112,11 @@ class SimulatedRun:
         """The photographs of a frame, from 0, in some phases."""
         frame = self.frames[number]
         light: dict[str, Signal | None] = {DARK: None, DARK_LIT: None}
+        real = self._real(number)
         if LIT in phases:
-            light[LIT] = self._object(number)
+            light[LIT] = self._object(number, real)
         if set(phases) - {LIT, *light}:
-            light.update(self._leds(number))
+            light.update(self._leds(number, real))
         return {phase: self._recorded(frame, phase, light[phase]) for phase in phases}
 
     def _recorded(self, frame: Frame, phase: str, light: Signal | None) -> Image16:
@@ -120,32 +127,43 @@ class SimulatedRun:
         random, exposure = generator(self.seed, *stream), self.chain.exposure(phase)
         return recorded(self.chain.sensor, self.maps, light, random, exposure)
 
-    def _object(self, number: int) -> Signal:
+    def _real(self, number: int) -> RealFrame | None:
+        optics, turned = self.chain.real, self._turned(number)
+        if optics is None:
+            return None
+        return RealFrame(self.built, number, turned, self.directions, optics)
+
+    def _object(self, number: int, real: RealFrame | None) -> Signal:
+        brightness = self.chain.object_light * self.chain.exposure(LIT)
+        if real is not None:
+            return real.object_light(self.scene) * np.float32(brightness / WHITE)
         pinhole = self.built.machine.camera.pinhole
         balls, turned = balls_of_frame(self.built, number), self._turned(number)
         walls = self.built.walls
         colour = object_light(
             pinhole, self.directions, balls, self.scene, turned, walls, self.blocks
         )
-        brightness = self.chain.object_light * self.chain.exposure(LIT)
         share = colour.astype(np.float32) * np.float32(brightness / WHITE)
         return blurred(share, self.chain.spread)
 
-    def _leds(self, number: int) -> dict[str, Signal]:
+    def _leds(self, number: int, real: RealFrame | None) -> dict[str, Signal]:
         camera = self.built.machine.camera
         leds = len(self.built.machine.leds)
         times = np.array([self.chain.exposure(f"led_{led + 1}") for led in range(leds)])
         light = np.broadcast_to(self.chain.led_light, leds) * times
         faint = FAINT_PX2 / max(1.0, float(light.max(initial=0.0)))
         turned, chain = self._turned(number), self.chain
+        if real is not None:
+            images = real.led_images(self.occluders, chain.dome, light, faint)
+            return {f"led_{led}": image for led, image in enumerate(images, 1)}
         points = led_light(self.built, number, turned, self.occluders, chain.dome, faint)
-        images: dict[str, Signal] = {}
+        found: dict[str, Signal] = {}
         for led, brightness in enumerate(light.tolist()):
             image = np.zeros((camera.height_px, camera.width_px), dtype=np.float32)
             pixel, area = points.of(led)
             add_points(image, pixel, brightness * area, self.chain.spread)
-            images[f"led_{led + 1}"] = image
-        return images
+            found[f"led_{led + 1}"] = image
+        return found
 
     def _turned(self, number: int) -> bool:
         return self.frames[number].object_turn_deg != 0

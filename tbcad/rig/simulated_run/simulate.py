@@ -15,19 +15,24 @@ from PIL import Image
 
 from tbcad.common.atomic_files import write_errors_as_input_errors
 from tbcad.errors import InputError
+from tbcad.light.simulate.capture.real import RealOptics
 from tbcad.light.simulate.capture.sensor import Image16, SimulatedSensor
 from tbcad.light.simulate.parallel import THREADS
 from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.real_camera import LEFT_OUT_OF_RUNS, real_optics
 from tbcad.light.simulate.scene.lamps import lit_by, read_lamps
 from tbcad.light.simulate.scene.object import SceneObject, built_in_object
 from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.real_scene import real_scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.light.simulate.scene.upper_lamps import upper_screen
 from tbcad.options.machines import SimulateRunOptions
 from tbcad.options.shared import exposures
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.single_files import Source, refuse_inputs
+from tbcad.prototype.balls.catalogue import roughnesses_nm
+from tbcad.records.camera_sheet import RealOpticsRecord
 from tbcad.records.run import (
     PHOTOGRAPHS,
     RECORD,
@@ -93,7 +98,11 @@ def prepare_run(
     phases = times.phases(_chosen_phases(options.phase_names(), phases_of(leds)))
     # Before a shell nothing stands, and its object is as bright from all sides.
     lamps = None if options.shell else read_lamps(export.folder)
-    scene = prepared_scene(lit_by(lamps, subject) if lamps else subject)
+    real, told = _real(export, options)
+    if real is None:
+        scene = prepared_scene(lit_by(lamps, subject) if lamps else subject)
+    else:
+        scene = real_scene(export, subject, lamps, options.gloss)
     if not options.shell:
         scene = replace(scene, screen=upper_screen(export.folder))
     stage = None if options.shell else stage_scene(export.folder)
@@ -103,6 +112,8 @@ def prepare_run(
         dome=dome_radius(export),
         led_light=LED_LIGHT * options.led_brightness,
         times=times,
+        real=real,
+        told=told,
     )
     runs = []
     for whole, every in builds:
@@ -111,6 +122,17 @@ def prepare_run(
         built = replace(whole, machine=whole.machine.of_frames(kept))
         runs.append(SimulatedRun(built, frames, scene, occluders, chain, options.seed))
     return tuple(runs), phases
+
+
+def _real(
+    export: ExportedDesign, options: SimulateRunOptions
+) -> tuple[RealOptics | None, RealOpticsRecord | None]:
+    """Lens and mirrors, and what the run's record says of them; None with ideal optics."""
+    if options.optics == "ideal":
+        return None, None
+    optics, told = real_optics(export, None if options.shell else roughnesses_nm(export.folder))
+    own = {"gloss": options.gloss, "bits": options.bits, "left_out": LEFT_OUT_OF_RUNS}
+    return optics, told.model_copy(update=own)
 
 
 def _prototype(export: ExportedDesign, errors: Errors, options: SimulateRunOptions) -> Builds:
@@ -230,6 +252,7 @@ def _record(runs: tuple[SimulatedRun, ...], phases: tuple[str, ...], export: Pat
         locked={},
         seconds=EXPOSURE_S * len(frames) * sum(map(runs[0].chain.exposure, phases)),
         geometry=geometry,
+        real=runs[0].chain.told,
     )
 
 
