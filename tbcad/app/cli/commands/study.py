@@ -8,6 +8,7 @@ import typer
 
 from tbcad.app.cli.app import Work, app, of_design, of_export
 from tbcad.options.call import tell_options
+from tbcad.options.captures import Optics
 from tbcad.options.checks import check_is_object
 from tbcad.options.shared import (
     Distance,
@@ -41,6 +42,9 @@ Sensors = Annotated[list[str] | None, typer.Option("--sensor", metavar="WxH")]
 times its width and height (Table II)."""
 Azimuths = Annotated[int, typer.Option(min=1, max=360)]
 """Number of azimuths at each elevation."""
+OpticsOption = Annotated[Optics, typer.Option("--optics")]
+"""Of the photographs. ideal: pinholes; real: the lens that the design requires with its pupil,
+shadows of the object on itself, scatter and noise, as tbcad capture --optics real."""
 
 
 RatiosOption = Annotated[list[str] | None, typer.Option("--ratio", metavar="C:P")]
@@ -125,6 +129,7 @@ def ssim_command(
     method: MethodOfStudy = "nearest",
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
+    optics: OpticsOption = "ideal",
 ) -> Work:
     """Compare views with the ground truth for several sensors, each with its own n (Fig. 9)."""
     check_is_object(object_file, up, unit)
@@ -134,7 +139,7 @@ def ssim_command(
     simulated = _sensors(sensors, spec)
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     subject = _subject(object_file, spec.optics.capture_diameter_mm, paint, up, unit)
-    return partial(ssim, spec, subject, simulated, places, _by(method))
+    return partial(ssim, spec, subject, simulated, places, _by(method), optics=optics)
 
 
 NsOption = Annotated[list[int] | None, typer.Option("--n", min=2, max=60)]
@@ -151,12 +156,13 @@ def balance_command(
         int, typer.Option(min=1, max=1000, help="Number of viewpoints, evenly over the hemisphere.")
     ] = 12,
     distance: Distance = 640.0,
+    optics: OpticsOption = "ideal",
 ) -> Work:
     """Find which balance of virtual cameras and pixels is best for which object (section 6)."""
     from tbcad.studies.balance import SUBDIVISIONS, balance
 
     wanted = tuple(sorted(set(ns or SUBDIVISIONS)))
-    return partial(balance, spec, wanted, views, distance, _by(method))
+    return partial(balance, spec, wanted, views, distance, _by(method), optics=optics)
 
 
 @study.command("prototype")
