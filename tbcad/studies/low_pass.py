@@ -11,9 +11,11 @@ from tbcad.core.optics.camera import Camera
 from tbcad.light.simulate.camera_photographs import photographed
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import Samples, subpixel_shifts, to_bytes
+from tbcad.light.simulate.capture.real import RealOptics
 from tbcad.light.simulate.scene.object import SceneObject
-from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import Shift
+from tbcad.light.simulate.scene.real_scene import scene_by
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import (
@@ -29,8 +31,9 @@ from tbcad.light.simulate.views.viewpoints import (
     ViewTargets,
     pinhole_targets,
 )
-from tbcad.options.captures import Geometry
+from tbcad.options.captures import Geometry, Optics
 from tbcad.studies.paper import claimed, notes
+from tbcad.studies.ssim import taken_by
 from tbcad.types import Bytes, Progress
 
 WHERE = "section 5.3, Fig. 11"
@@ -49,7 +52,7 @@ class Blur:
     geometry: str  # of the mirrors
     name: str  # none, filter or lens
     px: float  # separation or diameter, pixels
-    samples: Samples  # rays of a pixel
+    samples: Samples | RealOptics  # rays of a pixel, or the lens
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,18 @@ class BlurOptions:
             *(Blur(PROTOTYPE, "lens", px, defocus_shifts(px, rays)) for px in self.lens_px),
         ]
 
+    def real_cases(self, export: ExportedDesign) -> list[Blur]:
+        """Shell and prototype by real optics, whose lens blurs, and the prototype with filters."""
+        both = taken_by(export, "real", self.samples)
+        shell, balls = both["spheres"], both["prototype"]
+        assert isinstance(balls, RealOptics)
+        filtered = [(px, replace(balls, filter_px=px)) for px in self.separations_px]
+        return [
+            Blur(SHELL, NO_FILTER, 0.0, shell),
+            Blur(PROTOTYPE, NO_FILTER, 0.0, balls),
+            *(Blur(PROTOTYPE, "filter", px, one) for px, one in filtered),
+        ]
+
 
 def low_pass(
     export: ExportedDesign,
@@ -78,18 +93,19 @@ def low_pass(
     viewpoints: Viewpoints,
     options: BlurOptions,
     progress: Progress = lambda _: None,
+    optics: Optics = "ideal",
 ) -> Study:
     """The study: captures with each blur, and views of each against the truth.
 
     The distance of the viewpoints is that of the pinholes. InputError: the export has no prototype.
     """
-    scene, focus = prepared_scene(subject), ThinLens(claimed("prototype_aperture"), 0.0)
+    scene, focus = scene_by(optics, subject), ThinLens(claimed("prototype_aperture"), 0.0)
     near = replace(viewpoints, distance_mm=claimed("prototype_distance"))
     lenses = _lens_targets(scene, near.cameras(export.capture_mm, LENS_SIZE), focus, progress)
     pinholes = pinhole_targets(scene, viewpoints.cameras(export.capture_mm), progress)
     records: list[Record] = []
     sharpest: dict[str, float] = {}
-    for case in options.cases():
+    for case in options.cases() if optics == "ideal" else options.real_cases(export):
         geometry: Geometry = "prototype" if case.geometry == PROTOTYPE else "spheres"
         light_field = photographed(export, scene, geometry, case.samples, progress)
         contrast = _contrast(light_field)
@@ -102,7 +118,8 @@ def low_pass(
         for kind, quality in views.items():
             for row in Table.of_columns("", {**viewpoints.angles(), **quality}).records():
                 records.append({**head, "view": kind, **row, "photograph_contrast": relative})
-    table = Table.of_records("low-pass", records, (f"Object: {subject.name}.", *notes("low-pass")))
+    facts = f"Object: {subject.name}; {optics} optics."
+    table = Table.of_records("low-pass", records, (facts, *notes("low-pass")))
     means = Table.of_records("low-pass-means", _means(table))
     return Study("low-pass", _figures(means), (table, means), _panels(means))
 

@@ -15,10 +15,11 @@ from tbcad.core.spec.design import Spec
 from tbcad.light.simulate.camera_photographs import photographed, sphere_photographs
 from tbcad.light.simulate.capture.files import create_light_field, write_camera
 from tbcad.light.simulate.capture.light_field import NAME, LightField
-from tbcad.light.simulate.capture.photograph import Sensor
-from tbcad.light.simulate.real_camera import design_optics
+from tbcad.light.simulate.capture.photograph import Samples, Sensor
+from tbcad.light.simulate.capture.real import RealOptics
+from tbcad.light.simulate.real_camera import design_optics, real_optics
 from tbcad.light.simulate.scene.object import SceneObject
-from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.real_scene import scene_by
 from tbcad.light.simulate.scene.reflector import ExportedDesign, reflectors
 from tbcad.light.simulate.views.viewpoints import (
@@ -29,6 +30,7 @@ from tbcad.light.simulate.views.viewpoints import (
     pinhole_targets,
 )
 from tbcad.options.captures import Geometry, Optics
+from tbcad.prototype.balls.catalogue import recorded_roughness_nm
 from tbcad.studies.paper import (
     balanced_sensors,
     claims,
@@ -239,18 +241,21 @@ def prototype_vs_shell(
     method: ViewMethod,
     samples: int = 3,
     progress: Progress = lambda _: None,
+    optics: Optics = "ideal",
 ) -> Study:
     """The study: both light fields of one object, and the same views of both.
 
-    A pixel of a photograph is the mean of samples x samples rays. InputError: there is no prototype
-    in the export.
+    A pixel of an ideal photograph is the mean of samples x samples rays. InputError: there is no
+    prototype in the export.
     """
-    scene = prepared_scene(subject)
+    scene = scene_by(optics, subject)
     targets = pinhole_targets(scene, viewpoints.cameras(export.capture_mm), progress)
     kinds: tuple[Geometry, ...] = ("spheres", "prototype")
-    light_fields = (photographed(export, scene, kind, samples, progress) for kind in kinds)
+    takers = taken_by(export, optics, samples)
+    light_fields = (photographed(export, scene, kind, takers[kind], progress) for kind in kinds)
     shell, prototype = (targets.quality(method.views(one), progress) for one in light_fields)
-    facts = f"Object: {subject.name}; {method}; {samples} x {samples} rays a pixel."
+    rays = f"{samples} x {samples} rays a pixel" if optics == "ideal" else "real optics"
+    facts = f"Object: {subject.name}; {method}; {rays}."
     columns = {
         **viewpoints.angles(),
         **{
@@ -262,6 +267,16 @@ def prototype_vs_shell(
     }
     table = Table.of_columns("prototype", columns, (facts, *notes("prototype")))
     return Study("prototype", _prototype_figures(table), (table,), _prototype_panels(table))
+
+
+def taken_by(
+    export: ExportedDesign, optics: Optics, samples: Samples
+) -> dict[Geometry, Samples | RealOptics]:
+    """What takes the photographs of shell and prototype of an export."""
+    if optics == "ideal":
+        return {"spheres": samples, "prototype": samples}
+    balls = real_optics(export, recorded_roughness_nm(export.folder))[0]
+    return {"spheres": real_optics(export)[0], "prototype": balls}
 
 
 def _prototype_figures(table: Table) -> tuple[Figure, ...]:

@@ -106,10 +106,9 @@ def _roughness_nm(export: ExportedDesign, options: CaptureOptions) -> list[float
     """Of each ball of a prototype; None of a shell's mirrors."""
     if options.geometry != "prototype":
         return None
-    from tbcad.prototype.balls.catalogue import roughness_rq_nm
-    from tbcad.records.tables import BallRow
+    from tbcad.prototype.balls.catalogue import recorded_roughness_nm
 
-    return [roughness_rq_nm(ball.grade) for ball in BallRow.read(export.folder)]
+    return recorded_roughness_nm(export.folder)
 
 
 def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict[str, Any]:

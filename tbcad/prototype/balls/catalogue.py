@@ -130,6 +130,13 @@ def roughness_rq_nm(grade: str | None) -> float:
     return 1000 * RQ_OVER_RA * load_grades()[grade].roughness_ra_um
 
 
+def recorded_roughness_nm(exports: Path) -> list[float]:
+    """RMS roughness of each ball of a build, nm; InputError: its table of balls is broken."""
+    from tbcad.records.tables import BallRow
+
+    return [roughness_rq_nm(ball.grade) for ball in BallRow.read(exports)]
+
+
 def load_catalogue(names: Iterable[str]) -> Catalogue:
     """The balls of several catalogues as one by rising diameter; of equal ones the first counts.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.app.cli.app import Work, app, of_design, of_export
+from tbcad.errors import InputError
 from tbcad.options.call import tell_options
 from tbcad.options.captures import Optics
 from tbcad.options.checks import check_is_object
@@ -165,6 +166,11 @@ def balance_command(
     return partial(balance, spec, wanted, views, distance, _by(method), optics=optics)
 
 
+SamplesOption = Annotated[int | None, typer.Option(min=1, max=8, metavar="N")]
+"""Anti-aliasing of ideal photographs: a pixel is the mean of N x N rays; by default 3, with a
+low-pass filter 2."""
+
+
 @study.command("prototype")
 @of_export
 def prototype_command(
@@ -176,11 +182,11 @@ def prototype_command(
     method: MethodOfStudy = "nearest",
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
-    samples: Annotated[
-        int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
-    ] = 3,
+    samples: SamplesOption = None,
+    optics: OpticsOption = "ideal",
 ) -> Work:
     """Compare views from the prototype's merged photographs with those of the full shell."""
+    _check_real(optics, {"--samples": samples})
     check_is_object(object_file, up, unit)
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.light.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
@@ -189,7 +195,8 @@ def prototype_command(
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = _subject(object_file, export.capture_mm, paint, up, unit)
-    return partial(prototype_vs_shell, export, subject, places, _by(method), samples)
+    by = _by(method)
+    return partial(prototype_vs_shell, export, subject, places, by, samples or 3, optics=optics)
 
 
 FilterPxOption = Annotated[list[float] | None, typer.Option(min=0.01, max=16, metavar="PX")]
@@ -211,11 +218,11 @@ def low_pass_command(
     distance: Distance = 640.0,
     filter_px: FilterPxOption = None,
     lens_px: LensPxOption = None,
-    samples: Annotated[
-        int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
-    ] = 2,
+    samples: SamplesOption = None,
+    optics: OpticsOption = "ideal",
 ) -> Work:
     """Blur the prototype's photographs by an optical low-pass filter or a lens (5.3, Fig. 11)."""
+    _check_real(optics, {"--samples": samples, "--lens-px": lens_px})
     check_is_object(object_file, up, unit)
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.light.simulate.views.viewpoints import viewpoints_around
@@ -223,12 +230,12 @@ def low_pass_command(
 
     usual = BlurOptions()
     options = BlurOptions(
-        tuple(filter_px or usual.separations_px), tuple(lens_px or usual.lens_px), samples
+        tuple(filter_px or usual.separations_px), tuple(lens_px or usual.lens_px), samples or 2
     )
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = _subject(object_file, export.capture_mm, paint, up, unit)
-    return partial(low_pass, export, subject, places, options)
+    return partial(low_pass, export, subject, places, options, optics=optics)
 
 
 @study.command("calibration")
@@ -240,6 +247,13 @@ def calibration_command(folder: Path) -> Work:
 
     export = read_export(folder)
     return partial(calibration_study, export)
+
+
+def _check_real(optics: Optics, ideal: dict[str, object]) -> None:
+    """Refuse options of ideal photographs with real ones: those have a lens and its rays."""
+    for option, given in ideal.items():
+        if optics == "real" and given:
+            raise InputError(f"--optics real is not for {option}: leave one of both out")
 
 
 def _by(method: MethodOfStudy) -> "ViewMethod":

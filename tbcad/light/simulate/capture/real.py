@@ -62,10 +62,12 @@ class RealOptics:
     ray_share: float = RAY_SHARE  # of the pupil's diameter that rays go through
     fine: int = FINE  # rays of a pixel along its sides
     seed: int = 0  # of the noise
+    filter_px: float = 0.0  # separation of the four images of a low-pass filter; 0: none
 
     def kernel(self, camera: Camera) -> Floats:
         """Shares of fine samples in a pixel of a camera, as of `pixel_kernel`."""
-        return pixel_kernel(self.lens.cutoff(camera.pixel_pitch), self.fine)
+        cutoff = self.lens.cutoff(camera.pixel_pitch)
+        return pixel_kernel(cutoff, self.fine, filter_px=self.filter_px)
 
 
 @dataclass(frozen=True)
