@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pytest
 from scipy.stats import ttest_rel
 
 from tbcad.common.results import Study, study_files
+from tbcad.core.camera.sheet import write_camera_sheet
+from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.capture.photograph import Sensor
@@ -135,9 +138,13 @@ def test_low_pass_filter_blurs_the_views(export_folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_real_optics_of_shell_and_prototype(export_folder: Path) -> None:
+def test_real_optics_of_shell_and_prototype(
+    export_folder: Path, low_resolution_design: MirrorDesign, tmp_path: Path
+) -> None:
     """The lens blurs both, and a filter as well blurs more; the balls scatter as their grades."""
-    export, knot = read_export(export_folder), built_in_object(60.0)
+    folder = Path(copytree(export_folder, tmp_path / "build"))
+    write_camera_sheet(folder, low_resolution_design.arrays[0], 30.0)
+    export, knot = read_export(folder), built_in_object(60.0)
     viewpoints = SmallViews(**vars(viewpoints_around((30.0,), 1, 640.0)))
     ideal, real = (
         prototype_vs_shell(export, knot, viewpoints, BY_NEAREST, 1, optics=optics).tables[0]
