@@ -62,7 +62,8 @@ MADE = """\
 Yield and median of the worst virtual cameras are those of the best chain
 (`tbcad tolerance exports/ --process nickel-diamond`). `tbcad build NAME --process CHAIN` gives
 a design the margins that a chain needs. SSIM is that of four views of the knot by nearest rays;
-real optics are the lens that the design requires, shadows, scatter and noise ([0057](decisions/0057-judged-by-real-optics.md)).
+real optics are the lens that the design requires, shadows, scatter and noise
+([0057](decisions/0057-judged-by-real-optics.md)).
 
 {}"""
 SHOWN = ("object", "mirrors", "camera", "prototype")

@@ -1,8 +1,9 @@
 """What is varied, and what a candidate is judged by.
 
 The aim `ssim`, how like the truth views are, needs no file and no CAD kernel. Viewpoints, object
-and method are those of `tbcad study ssim` without options, or with its `--method field` and
-`--optics real`, so that both give the same figure.
+and method are those of `tbcad study ssim` without options, or with `--method field`, so that both
+give the same figure. Real optics are rated by photographs of a quarter of the pixels, and half of
+the viewpoints, which rank candidates alike (docs/decisions/0057-judged-by-real-optics.md).
 """
 
 import json
@@ -17,17 +18,23 @@ from pydantic import TypeAdapter, ValidationError
 
 from tbcad.cad.formats.checked_files import parse_json
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import FIT, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
 from tbcad.light.reconstruction.picture import BY_FIELD
-from tbcad.light.simulate.camera_photographs import design_light_field
+from tbcad.light.simulate.camera_photographs import sphere_light_field
+from tbcad.light.simulate.capture.light_field import LightField, traced_light_field
 from tbcad.light.simulate.capture.photograph import virtual_camera_pixels
+from tbcad.light.simulate.real_camera import design_optics
 from tbcad.light.simulate.scene.object import built_in_object
+from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.real_scene import scene_by
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.light.simulate.views.viewpoints import (
     BY_NEAREST,
     ELEVATIONS_DEG,
+    Viewpoints,
     ViewTargets,
     image_quality,
     pinhole_targets,
@@ -37,6 +44,8 @@ from tbcad.options.captures import Optics
 from tbcad.types import Floats
 
 AZIMUTHS, DISTANCE_MM = 4, 640.0
+COARSER = 2  # of real photographs: pixels of the design along the sides of one
+HALF_TURN_DEG = 180.0  # azimuths of their views below it: the others see the same mirrors mirrored
 
 ViewsBy: TypeAlias = Literal["nearest", "field"]
 
@@ -57,16 +66,32 @@ def mean_ssim(design: MirrorDesign, method: ViewsBy = "nearest", optics: Optics 
     with _one_at_a_time:
         truth = _truth(design.spec.optics.capture_diameter_mm, optics)
     by = BY_FIELD if method == "field" else BY_NEAREST
-    picture_of = by.views(design_light_field(design, truth.scene, optics))
+    picture_of = by.views(_light_field(design, truth.scene, optics))
     views = zip(truth.cameras, truth.truths, strict=True)
     return float(np.mean([image_quality(real, picture_of(at)).ssim for at, real in views]))
 
 
+def _light_field(designed: MirrorDesign, scene: Scene, optics: Optics) -> LightField:
+    if optics == "ideal":
+        return traced_light_field(designed, scene)
+    capture_mm = designed.spec.optics.capture_diameter_mm
+    coarse = [replace(at, camera=_coarser(at.camera)) for at in reflectors(designed)]
+    return sphere_light_field(coarse, scene, capture_mm, design_optics(designed))
+
+
+def _coarser(camera: Camera) -> Camera:
+    width, height = camera.width_px // COARSER, camera.height_px // COARSER
+    return replace(camera, width_px=width, height_px=height)
+
+
 @cache
 def _truth(capture_mm: float, optics: Optics) -> ViewTargets:
-    """What real cameras would see of the built-in object."""
-    cameras = viewpoints_around(ELEVATIONS_DEG, AZIMUTHS, DISTANCE_MM).cameras(capture_mm)
-    return pinhole_targets(scene_by(optics, built_in_object(capture_mm)), cameras)
+    """What pinhole cameras would see of the built-in object."""
+    around = viewpoints_around(ELEVATIONS_DEG, AZIMUTHS, DISTANCE_MM)
+    kept = around.azimuth_deg < (HALF_TURN_DEG if optics == "real" else 360)
+    places = Viewpoints(around.elevation_deg[kept], around.azimuth_deg[kept], DISTANCE_MM)
+    scene = scene_by(optics, built_in_object(capture_mm))
+    return pinhole_targets(scene, places.cameras(capture_mm))
 
 
 @dataclass(frozen=True)

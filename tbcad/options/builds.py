@@ -49,8 +49,8 @@ class OptimizeOptions(Call):
     objectives: Annotated[Sequence[str], typer.Option("--for", metavar="AIM")] = ()
     """Objective; repeatable, with equal weights. minimum: pixels of the virtual camera with fewest;
     pixels: mean of the logarithms of the pixels; evenness: their coefficient of variation; ssim: of
-    24 views of a knot, by --method, which takes several times as long; size: of the machine. By
-    default the first three."""
+    views of a knot, by --method and --optics, which takes several times as long; size: of the
+    machine. By default the first three."""
     out: Annotated[AnyPath, typer.Option("--out", "-o")] = Path("better.toml")
     """TOML file to write; table and plot beside it."""
     max_size_mm: float | None = None
@@ -62,7 +62,8 @@ class OptimizeOptions(Call):
     field that is fitted to all rays, some seconds a candidate."""
     optics: Optics | None = None
     """Of the photographs that ssim compares views of. real, the default: the lens that each
-    candidate requires, shadows of the object on itself, scatter and noise; ideal: pinholes."""
+    candidate requires, shadows of the object on itself, scatter and noise, by a quarter of the
+    pixels and 12 views; ideal: pinholes, 24 views."""
     front: bool = False
     """With several aims: search also where each of them counts most, so that more candidates are
     found that no other betters (the Pareto front)."""
