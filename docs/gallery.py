@@ -53,14 +53,17 @@ degrees. With few virtual cameras some of its depth is wrong (specks).
 """
 
 MADE_COLUMNS = ["design", "made by", "yield", "worst camera"]
-MADE_COLUMNS += ["pixels of a virtual camera", "SSIM of views"]
+SSIM = {"SSIM, ideal optics": "ideal", "SSIM, real optics": "real"}
+MADE_COLUMNS += ["pixels of a virtual camera", *SSIM]
 MADE = """\
 ## What can be made
 
 *Made by*: the [chains](tolerance.md#chains) with a yield of 95 % or more in 1,000 simulated builds.
 Yield and median of the worst virtual cameras are those of the best chain
 (`tbcad tolerance exports/ --process nickel-diamond`). `tbcad build NAME --process CHAIN` gives
-a design the margins that a chain needs.
+a design the margins that a chain needs. SSIM is that of four views of the knot by nearest rays;
+real optics are the lens that the design requires, shadows, scatter and noise
+([0057](decisions/0057-judged-by-real-optics.md)).
 
 {}"""
 SHOWN = ("object", "mirrors", "camera", "prototype")
@@ -98,7 +101,7 @@ def figures(found: Overview) -> dict[str, Any]:
         "both shells, by FDM": f"{shells.volume_cm3:.0f} cm3, about {shells.mass_g:.0f} g, "
         f"{shells.hours:.0f} h",
         "pixels of a virtual camera": str(seeing_pixels(spec)),
-        "SSIM of views": f"{view_ssims({'': spec})['']:.3f}",
+        **{name: f"{view_ssims({'': spec}, by)['']:.3f}" for name, by in SSIM.items()},
         "prototype": found.note.replace("no prototype", "none").rpartition(":")[0],
     }
     if prototype is not None:
@@ -164,7 +167,7 @@ def design_row(name: str, row: dict[str, Any]) -> list[str]:
         ", ".join(good_chains(row)) or f"none ({best})",
         *([f"{100 * share:.3g} %", f"{covered:.2f} of {row['object']}"] if share else ["", ""]),
         row["pixels of a virtual camera"],
-        row["SSIM of views"],
+        *(row[name] for name in SSIM),
     ]
 
 

@@ -2,7 +2,8 @@
 
 The aim `ssim`, how like the truth views are, needs no file and no CAD kernel. Viewpoints, object
 and method are those of `tbcad study ssim` without options, or with `--method field`, so that both
-give the same figure.
+give the same figure. Real optics are rated by photographs of a quarter of the pixels, and half of
+the viewpoints, which rank candidates alike (docs/decisions/0057-judged-by-real-optics.md).
 """
 
 import json
@@ -17,25 +18,34 @@ from pydantic import TypeAdapter, ValidationError
 
 from tbcad.cad.formats.checked_files import parse_json
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
+from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import FIT, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
 from tbcad.light.reconstruction.picture import BY_FIELD
-from tbcad.light.simulate.capture.light_field import traced_light_field
+from tbcad.light.simulate.camera_photographs import sphere_light_field
+from tbcad.light.simulate.capture.light_field import LightField, traced_light_field
 from tbcad.light.simulate.capture.photograph import virtual_camera_pixels
+from tbcad.light.simulate.real_camera import design_optics
 from tbcad.light.simulate.scene.object import built_in_object
-from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.light.simulate.scene.real_scene import scene_by
+from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.light.simulate.views.viewpoints import (
     BY_NEAREST,
     ELEVATIONS_DEG,
+    Viewpoints,
     ViewTargets,
     image_quality,
     pinhole_targets,
     viewpoints_around,
 )
+from tbcad.options.captures import Optics
 from tbcad.types import Floats
 
 AZIMUTHS, DISTANCE_MM = 4, 640.0
+COARSER = 2  # of real photographs: pixels of the design along the sides of one
+HALF_TURN_DEG = 180.0  # azimuths of their views below it: the others see the same mirrors mirrored
 
 ViewsBy: TypeAlias = Literal["nearest", "field"]
 
@@ -48,24 +58,40 @@ LEAST = 0.4  # of what the first design has, of all lengths
 CAMERA_X, CAMERA_Z, SEMI_MINOR = 0.5, 0.8, 0.5
 Place = tuple[float, float, float, float, float]
 """Camera's x and z, and the semi-minor axis, mm; stretch of the directions along x and y."""
-SCHEMA = "tbcad-candidates/2"
+SCHEMA = "tbcad-candidates/3"
 
 
-def mean_ssim(design: MirrorDesign, method: ViewsBy = "nearest") -> float:
+def mean_ssim(design: MirrorDesign, method: ViewsBy = "nearest", optics: Optics = "real") -> float:
     """Mean SSIM of views over the frame, from the stated viewpoints."""
     with _one_at_a_time:
-        truth = _truth(design.spec.optics.capture_diameter_mm)
+        truth = _truth(design.spec.optics.capture_diameter_mm, optics)
     by = BY_FIELD if method == "field" else BY_NEAREST
-    picture_of = by.views(traced_light_field(design, truth.scene))
+    picture_of = by.views(_light_field(design, truth.scene, optics))
     views = zip(truth.cameras, truth.truths, strict=True)
     return float(np.mean([image_quality(real, picture_of(at)).ssim for at, real in views]))
 
 
+def _light_field(designed: MirrorDesign, scene: Scene, optics: Optics) -> LightField:
+    if optics == "ideal":
+        return traced_light_field(designed, scene)
+    capture_mm = designed.spec.optics.capture_diameter_mm
+    coarse = [replace(at, camera=_coarser(at.camera)) for at in reflectors(designed)]
+    return sphere_light_field(coarse, scene, capture_mm, design_optics(designed))
+
+
+def _coarser(camera: Camera) -> Camera:
+    width, height = camera.width_px // COARSER, camera.height_px // COARSER
+    return replace(camera, width_px=width, height_px=height)
+
+
 @cache
-def _truth(capture_mm: float) -> ViewTargets:
-    """What real cameras would see of the built-in object."""
-    cameras = viewpoints_around(ELEVATIONS_DEG, AZIMUTHS, DISTANCE_MM).cameras(capture_mm)
-    return pinhole_targets(prepared_scene(built_in_object(capture_mm)), cameras)
+def _truth(capture_mm: float, optics: Optics) -> ViewTargets:
+    """What pinhole cameras would see of the built-in object."""
+    around = viewpoints_around(ELEVATIONS_DEG, AZIMUTHS, DISTANCE_MM)
+    kept = around.azimuth_deg < (HALF_TURN_DEG if optics == "real" else 360)
+    places = Viewpoints(around.elevation_deg[kept], around.azimuth_deg[kept], DISTANCE_MM)
+    scene = scene_by(optics, built_in_object(capture_mm))
+    return pinhole_targets(scene, places.cameras(capture_mm))
 
 
 @dataclass(frozen=True)
@@ -146,14 +172,18 @@ def placed(spec: Spec, place: Place) -> Spec:
 
 
 def evaluate(
-    spec: Spec, ssim_within: MachineLimits | None, place: Place, method: ViewsBy = "nearest"
+    spec: Spec,
+    ssim_within: MachineLimits | None,
+    place: Place,
+    method: ViewsBy = "nearest",
+    optics: Optics = "real",
 ) -> DesignCandidate:
     """Design the mirrors of a place, count pixels, and compare views within limits, if given."""
     try:
         designed = design(placed(spec, place))
         figures = figures_of(designed)
         if ssim_within and ssim_within.excess(figures) == 0:
-            figures = replace(figures, ssim=mean_ssim(designed, method))
+            figures = replace(figures, ssim=mean_ssim(designed, method, optics))
         return DesignCandidate(place, figures)
     except ValidationError as error:
         return DesignCandidate(place, None, error.errors()[0]["msg"])
@@ -201,6 +231,6 @@ def read_store(store: Path, key: str) -> dict[Place, DesignCandidate]:
         raise InputError(f"{store}: no list of candidates ({error}): remove it") from None
     if not known:
         raise InputError(
-            f"{store}: of another design or method: name another --out, or remove the file"
+            f"{store}: of another design, method or optics: name another --out, or remove the file"
         )
     return {one.place: one for one in found}

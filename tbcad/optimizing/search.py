@@ -22,6 +22,7 @@ from tbcad.core.spec.design import Spec
 from tbcad.core.spec.load import spec_dict
 from tbcad.errors import InputError
 from tbcad.optimizing.candidate import (
+    SCHEMA,
     DesignCandidate,
     Figures,
     MachineLimits,
@@ -113,9 +114,9 @@ class _Judges:
     def __init__(self, spec: Spec, asked: OptimizeOptions, store: Path | None) -> None:
         """Read what an earlier search judged; judgements of another design are of no use."""
         self._spec, self._asked, self._store = spec, asked, store
-        text = json.dumps(spec_dict(spec), sort_keys=True)
-        method = "field" if asked.method == "field" else ""
-        self._key = sha256((text + method).encode()).hexdigest()
+        self._method, self._optics = asked.method or "nearest", asked.optics or "real"
+        told = [SCHEMA, spec_dict(spec), self._method, self._optics]
+        self._key = sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
         self.judged = read_store(store, self._key) if store else {}
         self.start: Figures | None = None
         self.limits = ANY_SIZE
@@ -126,8 +127,8 @@ class _Judges:
         """Candidates at places, of which only those are worked out that the store does not have."""
         asked, limits = self._asked, limits or self.limits
         new = [p for p in dict.fromkeys(places) if self._is_open(limits, self.judged.get(p))]
-        wanted, method = limits if "ssim" in asked.aims else None, asked.method or "nearest"
-        work = partial(evaluate, self._spec, wanted, method=method)
+        wanted = limits if "ssim" in asked.aims else None
+        work = partial(evaluate, self._spec, wanted, method=self._method, optics=self._optics)
         for one in run_units(work, new, asked.scheduler):
             self.judged[one.place] = one
         if (store := self._store) and new:

@@ -9,6 +9,7 @@ import typer
 
 from tbcad.errors import InputError
 from tbcad.options.call import Call
+from tbcad.options.captures import Optics
 from tbcad.options.checks import check_are_printers, check_is_folder
 from tbcad.options.shared import (
     AnyPath,
@@ -48,8 +49,8 @@ class OptimizeOptions(Call):
     objectives: Annotated[Sequence[str], typer.Option("--for", metavar="AIM")] = ()
     """Objective; repeatable, with equal weights. minimum: pixels of the virtual camera with fewest;
     pixels: mean of the logarithms of the pixels; evenness: their coefficient of variation; ssim: of
-    24 views of a knot, by --method, which takes several times as long; size: of the machine. By
-    default the first three."""
+    views of a knot, by --method and --optics, which takes several times as long; size: of the
+    machine. By default the first three."""
     out: Annotated[AnyPath, typer.Option("--out", "-o")] = Path("better.toml")
     """TOML file to write; table and plot beside it."""
     max_size_mm: float | None = None
@@ -59,6 +60,10 @@ class OptimizeOptions(Call):
     method: Literal["nearest", "field"] | None = None
     """Of the views that ssim compares. nearest, the default: by nearest rays; field: by a coarse
     field that is fitted to all rays, some seconds a candidate."""
+    optics: Optics | None = None
+    """Of the photographs that ssim compares views of. real, the default: the lens that each
+    candidate requires, shadows of the object on itself, scatter and noise, by a quarter of the
+    pixels and 12 views; ideal: pinholes, 24 views."""
     front: bool = False
     """With several aims: search also where each of them counts most, so that more candidates are
     found that no other betters (the Pareto front)."""
@@ -98,6 +103,11 @@ class OptimizeOptions(Call):
         if self.method is not None and "ssim" not in self.aims:
             raise InputError(
                 f"--method {self.method} is of the views that ssim compares: add --for ssim"
+            )
+        if self.optics is not None and "ssim" not in self.aims:
+            raise InputError(
+                f"--optics {self.optics} is of the photographs that ssim compares views of: add "
+                "--for ssim"
             )
         for name in ("max_size_mm", "max_view_angle_deg"):
             number = getattr(self, name)
@@ -230,4 +240,7 @@ class ToleranceOptions(Call):
     """Seed of all random errors."""
     calibrated_mrad: Annotated[float, typer.Option(min=0, max=100)] = 0.5
     """Error of each mirror's direction after calibration, mrad."""
+    optics: Optics = "ideal"
+    """Of the pictures. ideal: pinholes; real: the lens of camera.json, shadows, noise, as tbcad
+    capture --optics real."""
     scheduler: Scheduler = None

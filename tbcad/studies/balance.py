@@ -12,10 +12,10 @@ from tbcad.common.results import Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import Spec
-from tbcad.light.simulate.capture.light_field import traced_light_field
+from tbcad.light.simulate.camera_photographs import design_light_field
 from tbcad.light.simulate.capture.photograph import Sensor, count_pixels, virtual_cameras
 from tbcad.light.simulate.scene.object import patterned_ball
-from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.real_scene import scene_by
 from tbcad.light.simulate.views.viewpoints import (
     ViewMethod,
     ViewTargets,
@@ -23,6 +23,7 @@ from tbcad.light.simulate.views.viewpoints import (
     pinhole_targets,
     viewpoints_over_hemisphere,
 )
+from tbcad.options.captures import Optics
 from tbcad.studies.paper import notes, try_design, with_lens_of_table_i
 from tbcad.types import Progress
 
@@ -57,14 +58,16 @@ def balance(
     distance_mm: float,
     method: ViewMethod,
     progress: Progress = lambda _: None,
+    optics: Optics = "ideal",
 ) -> Study:
     """The study: SSIM of views over n at the design's sensor, for four objects."""
     spec = with_lens_of_table_i(spec)
     viewpoints = viewpoints_over_hemisphere(views, distance_mm)
     cameras = viewpoints.cameras(spec.optics.capture_diameter_mm)
-    seen = subjects(spec.optics.capture_diameter_mm, cameras, progress)
-    records = [one for n in ns for one in _of_n(spec, n, seen, method, progress)]
-    table = Table.of_records("balance", records, (f"Method: {method}.", *notes("balance")), COLUMNS)
+    seen = subjects(spec.optics.capture_diameter_mm, cameras, progress, optics)
+    records = [one for n in ns for one in _of_n(spec, n, seen, method, progress, optics)]
+    facts = f"Method: {method}; {optics} optics."
+    table = Table.of_records("balance", records, (facts, *notes("balance")), COLUMNS)
     best = [one for subject in seen for one in _best(table, subject)]
     panels = (_panel(table, seen, method),)
     figures = (Figure(f"{one['object']}: best n", "", one["n"], where="section 6") for one in best)
@@ -72,19 +75,26 @@ def balance(
     return Study("balance", tuple(figures), (table, bests), panels)
 
 
-def subjects(capture_mm: float, cameras: list[Camera], progress: Progress) -> list[Subject]:
+def subjects(
+    capture_mm: float, cameras: list[Camera], progress: Progress, optics: Optics = "ideal"
+) -> list[Subject]:
     """The four objects with their truth."""
     result = []
     for share in (NEAR, FAR):
         radius = round(share * capture_mm / 2, 2)
-        matt = prepared_scene(patterned_ball(radius))
+        matt = scene_by(optics, patterned_ball(radius))
         for surface, scene in (("matt", matt), ("glossy", replace(matt, gloss=GLOSS))):
             result.append(Subject(surface, radius, pinhole_targets(scene, cameras, progress)))
     return result
 
 
 def _of_n(
-    spec: Spec, n: int, seen: list[Subject], method: ViewMethod, progress: Progress
+    spec: Spec,
+    n: int,
+    seen: list[Subject],
+    method: ViewMethod,
+    progress: Progress,
+    optics: Optics,
 ) -> list[Record]:
     """A row for each object, or for what a refusal of the design says."""
     attempt = try_design(spec, optics={"n": n})
@@ -95,7 +105,7 @@ def _of_n(
     rows: list[Record] = []
     for one in seen:
         progress(f"n = {n}: {one.name}")
-        value = ssim_on_object(attempt.design, one.seen, method)
+        value = ssim_on_object(attempt.design, one.seen, method, optics)
         own: Record = {"surface": one.surface, "radius_mm": one.radius_mm, "ssim_on_object": value}
         rows.append({**head, **own})
     return rows
@@ -109,9 +119,11 @@ def _counts(design: MirrorDesign) -> Record:
     return {"virtual_cameras": number, "pixels": float(2 * counts.seen.sum() / number)}
 
 
-def ssim_on_object(design: MirrorDesign, seen: ViewTargets, method: ViewMethod) -> float:
+def ssim_on_object(
+    design: MirrorDesign, seen: ViewTargets, method: ViewMethod, optics: Optics = "ideal"
+) -> float:
     """Mean local SSIM where the object is, over all views."""
-    view = method.views(traced_light_field(design, seen.scene))
+    view = method.views(design_light_field(design, seen.scene, optics))
     values = [
         image_quality_map(truth, view(at))[1][mask].mean()
         for at, truth, mask in zip(seen.cameras, seen.truths, seen.masks, strict=True)

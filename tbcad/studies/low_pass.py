@@ -12,10 +12,10 @@ from tbcad.light.simulate.camera_photographs import photographed
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import Samples, subpixel_shifts, to_bytes
 from tbcad.light.simulate.capture.real import RealOptics
-from tbcad.light.simulate.real_camera import real_optics
 from tbcad.light.simulate.scene.object import SceneObject
-from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
+from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import Shift
+from tbcad.light.simulate.scene.real_scene import scene_by
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.refocus import (
@@ -31,14 +31,13 @@ from tbcad.light.simulate.views.viewpoints import (
     ViewTargets,
     pinhole_targets,
 )
-from tbcad.options.captures import Geometry
-from tbcad.prototype.balls.catalogue import roughnesses_nm
-from tbcad.records.camera_sheet import NAME
+from tbcad.options.captures import Geometry, Optics
 from tbcad.studies.paper import claimed, notes
+from tbcad.studies.ssim import taken_by
 from tbcad.types import Bytes, Progress
 
 WHERE = "section 5.3, Fig. 11"
-NO_FILTER, REAL = "none", "real optics"
+NO_FILTER = "none"
 SHELL, PROTOTYPE = "shell", "prototype"
 ELEVATIONS_DEG = (15.0, 45.0)
 LENS_SIZE = (320, 240)  # pixels of the pictures with the large aperture
@@ -51,9 +50,9 @@ class Blur:
     """What blurs the photographs of one case."""
 
     geometry: str  # of the mirrors
-    name: str  # none, filter, lens or real optics
-    px: float  # separation or diameter, pixels; 0 without and of real optics
-    samples: Samples | RealOptics  # rays of a pixel, or what the camera is
+    name: str  # none, filter or lens
+    px: float  # separation or diameter, pixels
+    samples: Samples | RealOptics  # rays of a pixel, or the lens
 
 
 @dataclass(frozen=True)
@@ -65,24 +64,27 @@ class BlurOptions:
     # a pixel, in each of the filter's images, is the mean of samples x samples rays
     samples: int = 2
 
-    def cases(self, export: ExportedDesign) -> list[Blur]:
-        """Shell and prototype without blur, the prototype with each, both with real optics."""
+    def cases(self) -> list[Blur]:
+        """Shell and prototype without blur, and the prototype with each."""
         n, rays = self.samples, LENS_RAYS * self.samples**2
         return [
             Blur(SHELL, NO_FILTER, 0.0, n),
             Blur(PROTOTYPE, NO_FILTER, 0.0, n),
             *(Blur(PROTOTYPE, "filter", px, low_pass_shifts(px, n)) for px in self.separations_px),
             *(Blur(PROTOTYPE, "lens", px, defocus_shifts(px, rays)) for px in self.lens_px),
-            *real_cases(export),
         ]
 
-
-def real_cases(export: ExportedDesign) -> list[Blur]:
-    """Shell and prototype before the lens of camera.json; none where a build is without it."""
-    if not (export.folder / NAME).is_file():
-        return []
-    roughness = {SHELL: None, PROTOTYPE: roughnesses_nm(export.folder)}
-    return [Blur(name, REAL, 0.0, real_optics(export, of)[0]) for name, of in roughness.items()]
+    def real_cases(self, export: ExportedDesign) -> list[Blur]:
+        """Shell and prototype by real optics, whose lens blurs, and the prototype with filters."""
+        both = taken_by(export, "real", self.samples)
+        shell, balls = both["spheres"], both["prototype"]
+        assert isinstance(balls, RealOptics)
+        filtered = [(px, replace(balls, filter_px=px)) for px in self.separations_px]
+        return [
+            Blur(SHELL, NO_FILTER, 0.0, shell),
+            Blur(PROTOTYPE, NO_FILTER, 0.0, balls),
+            *(Blur(PROTOTYPE, "filter", px, one) for px, one in filtered),
+        ]
 
 
 def low_pass(
@@ -91,18 +93,19 @@ def low_pass(
     viewpoints: Viewpoints,
     options: BlurOptions,
     progress: Progress = lambda _: None,
+    optics: Optics = "ideal",
 ) -> Study:
     """The study: captures with each blur, and views of each against the truth.
 
     The distance of the viewpoints is that of the pinholes. InputError: the export has no prototype.
     """
-    scene, focus = prepared_scene(subject), ThinLens(claimed("prototype_aperture"), 0.0)
+    scene, focus = scene_by(optics, subject), ThinLens(claimed("prototype_aperture"), 0.0)
     near = replace(viewpoints, distance_mm=claimed("prototype_distance"))
     lenses = _lens_targets(scene, near.cameras(export.capture_mm, LENS_SIZE), focus, progress)
     pinholes = pinhole_targets(scene, viewpoints.cameras(export.capture_mm), progress)
     records: list[Record] = []
     sharpest: dict[str, float] = {}
-    for case in options.cases(export):
+    for case in options.cases() if optics == "ideal" else options.real_cases(export):
         geometry: Geometry = "prototype" if case.geometry == PROTOTYPE else "spheres"
         light_field = photographed(export, scene, geometry, case.samples, progress)
         contrast = _contrast(light_field)
@@ -115,7 +118,8 @@ def low_pass(
         for kind, quality in views.items():
             for row in Table.of_columns("", {**viewpoints.angles(), **quality}).records():
                 records.append({**head, "view": kind, **row, "photograph_contrast": relative})
-    table = Table.of_records("low-pass", records, (f"Object: {subject.name}.", *notes("low-pass")))
+    facts = f"Object: {subject.name}; {optics} optics."
+    table = Table.of_records("low-pass", records, (facts, *notes("low-pass")))
     means = Table.of_records("low-pass-means", _means(table))
     return Study("low-pass", _figures(means), (table, means), _panels(means))
 
@@ -158,8 +162,7 @@ def _means(table: Table) -> list[Record]:
 
 
 def _name(record: Record) -> str:
-    named = {NO_FILTER: "no blur", REAL: REAL}
-    blur = named.get(str(record["blur"]), f"{record['blur']} {record['px']:g} px")
+    blur = "no blur" if record["blur"] == NO_FILTER else f"{record['blur']} {record['px']:g} px"
     return f"{record['geometry']}, {blur}"
 
 

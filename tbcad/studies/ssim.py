@@ -12,13 +12,15 @@ from scipy.stats import linregress, ttest_rel
 from tbcad.common.results import Cell, Figure, PlotPanel, Record, Series, Study, Table
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.design import Spec
-from tbcad.light.simulate.camera_photographs import photographed
+from tbcad.light.simulate.camera_photographs import photographed, sphere_photographs
 from tbcad.light.simulate.capture.files import create_light_field, write_camera
 from tbcad.light.simulate.capture.light_field import NAME, LightField
-from tbcad.light.simulate.capture.photograph import Sensor, photograph
+from tbcad.light.simulate.capture.photograph import Samples, Sensor
+from tbcad.light.simulate.capture.real import RealOptics
+from tbcad.light.simulate.real_camera import design_optics, real_optics
 from tbcad.light.simulate.scene.object import SceneObject
-from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.light.simulate.scene.rays import exact_tracer
+from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.light.simulate.scene.real_scene import scene_by
 from tbcad.light.simulate.scene.reflector import ExportedDesign, reflectors
 from tbcad.light.simulate.views.viewpoints import (
     QUALITY,
@@ -27,7 +29,8 @@ from tbcad.light.simulate.views.viewpoints import (
     ViewTargets,
     pinhole_targets,
 )
-from tbcad.options.captures import Geometry
+from tbcad.options.captures import Geometry, Optics
+from tbcad.prototype.balls.catalogue import roughnesses_nm
 from tbcad.studies.paper import (
     balanced_sensors,
     claims,
@@ -66,19 +69,19 @@ def ssim(
     viewpoints: Viewpoints,
     method: ViewMethod,
     progress: Progress = lambda _: None,
+    optics: Optics = "ideal",
 ) -> Study:
     """The study: captures with every sensor and its n, and views of each against the truth."""
-    spec, scene = with_lens_of_table_i(spec), prepared_scene(subject)
+    spec, scene = with_lens_of_table_i(spec), scene_by(optics, subject)
     cameras = viewpoints.cameras(spec.optics.capture_diameter_mm)
     targets = pinhole_targets(scene, cameras, progress)
     records: list[Record] = []
     for sensor in sensors:
-        head, quality, reason = _compared(spec, targets, method, progress, sensor)
+        head, quality, reason = _compared(spec, targets, method, progress, sensor, optics)
         views = Table.of_columns("", {**viewpoints.angles(), **quality})
         records += [{**head, **view, "reason": reason} for view in views.records()]
-    table = Table.of_records(
-        "ssim", records, (f"Object: {subject.name}; {method}.", *notes("ssim"))
-    )
+    facts = f"Object: {subject.name}; {method}; {optics} optics."
+    table = Table.of_records("ssim", records, (facts, *notes("ssim")))
     means = Table.of_records(
         "ssim-means", [mean for sensor in sensors for mean in _means(table, sensor)], columns=MEANS
     )
@@ -88,27 +91,33 @@ def ssim(
 
 
 def _compared(
-    spec: Spec, targets: ViewTargets, method: ViewMethod, progress: Progress, sensor: Sensor
+    spec: Spec,
+    targets: ViewTargets,
+    method: ViewMethod,
+    progress: Progress,
+    sensor: Sensor,
+    optics: Optics,
 ) -> tuple[Record, dict[str, Floats], str]:
     """One sensor with its n, QUALITY of its views, and what a refusal of its design says."""
     head: Record = {**asdict(sensor), "n": sensor_n(spec, sensor)}
     attempt = try_design(spec, optics={"n": head["n"]}, camera=asdict(sensor))
     if attempt.design is None:
         return head, dict.fromkeys(QUALITY, np.full(len(targets.cameras), np.nan)), attempt.reason
-    with _light_field(attempt.design, targets.scene, progress) as light_field:
+    with _light_field(attempt.design, targets.scene, optics, progress) as light_field:
         return head, targets.quality(method.views(light_field), progress), attempt.reason
 
 
 @contextmanager
-def _light_field(design: MirrorDesign, scene: Scene, progress: Progress) -> Iterator[LightField]:
+def _light_field(
+    design: MirrorDesign, scene: Scene, optics: Optics, progress: Progress
+) -> Iterator[LightField]:
     """The light field of a design in a file: of the largest sensor it would fill the memory."""
     with tempfile.TemporaryDirectory(prefix="tbcad-study-") as folder:
         file = Path(folder) / NAME
         with create_light_field(file, design.spec.optics.capture_diameter_mm, {}) as store:
-            for reflector in reflectors(design):
-                trace = exact_tracer(reflector)
-                bands = photograph(reflector.camera, trace, scene, 1, progress)
-                write_camera(store, reflector, bands)
+            taken_by = design_optics(design) if optics == "real" else 1
+            for one, bands in sphere_photographs(reflectors(design), scene, taken_by, progress):
+                write_camera(store, one, bands())
         with LightField.open(file) as light_field:
             yield light_field
 
@@ -232,18 +241,21 @@ def prototype_vs_shell(
     method: ViewMethod,
     samples: int = 3,
     progress: Progress = lambda _: None,
+    optics: Optics = "ideal",
 ) -> Study:
     """The study: both light fields of one object, and the same views of both.
 
-    A pixel of a photograph is the mean of samples x samples rays. InputError: there is no prototype
-    in the export.
+    A pixel of an ideal photograph is the mean of samples x samples rays. InputError: there is no
+    prototype in the export.
     """
-    scene = prepared_scene(subject)
+    scene = scene_by(optics, subject)
     targets = pinhole_targets(scene, viewpoints.cameras(export.capture_mm), progress)
     kinds: tuple[Geometry, ...] = ("spheres", "prototype")
-    light_fields = (photographed(export, scene, kind, samples, progress) for kind in kinds)
+    takers = taken_by(export, optics, samples)
+    light_fields = (photographed(export, scene, kind, takers[kind], progress) for kind in kinds)
     shell, prototype = (targets.quality(method.views(one), progress) for one in light_fields)
-    facts = f"Object: {subject.name}; {method}; {samples} x {samples} rays a pixel."
+    rays = f"{samples} x {samples} rays a pixel" if optics == "ideal" else "real optics"
+    facts = f"Object: {subject.name}; {method}; {rays}."
     columns = {
         **viewpoints.angles(),
         **{
@@ -255,6 +267,16 @@ def prototype_vs_shell(
     }
     table = Table.of_columns("prototype", columns, (facts, *notes("prototype")))
     return Study("prototype", _prototype_figures(table), (table,), _prototype_panels(table))
+
+
+def taken_by(
+    export: ExportedDesign, optics: Optics, samples: Samples
+) -> dict[Geometry, Samples | RealOptics]:
+    """What takes the photographs of shell and prototype of an export."""
+    if optics == "ideal":
+        return {"spheres": samples, "prototype": samples}
+    balls = real_optics(export, roughnesses_nm(export.folder))[0]
+    return {"spheres": real_optics(export)[0], "prototype": balls}
 
 
 def _prototype_figures(table: Table) -> tuple[Figure, ...]:

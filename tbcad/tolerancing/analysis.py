@@ -8,8 +8,9 @@ from typing import Any
 from tbcad.common import schedule
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.real_camera import real_optics
 from tbcad.light.simulate.scene.object import SceneObject
-from tbcad.light.simulate.scene.ray_casting import prepared_scene
+from tbcad.light.simulate.scene.real_scene import scene_by
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.options.builds import ToleranceOptions
 from tbcad.tolerancing.margin import Margin, SolvedDesigns, margin, solved_designs
@@ -183,8 +184,10 @@ class _Simulator:
 
     def sharpness(self, case: MonteCarloCase, scene_object: SceneObject) -> Sharpness:
         """Sharpness of a few builds' pictures."""
-        export, options, scene = self.export, self.options, prepared_scene(scene_object)
-        reference = reference_views(scene, export.capture_mm, options.detail)
+        export, options = self.export, self.options
+        scene = scene_by(options.optics, scene_object)
+        taken_by = real_optics(export)[0] if options.optics == "real" else 1
+        reference = reference_views(scene, export.capture_mm, options.detail, taken_by)
         builds, residual = case.draws(range(PHOTOGRAPHED_BUILDS)), options.calibrated_mrad / 1000
         return sharpness(
             export.reflectors, builds, scene, reference, residual, options.seed, options.detail

@@ -10,6 +10,7 @@ from tbcad.core.spec.design import EdgeKind, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
 from tbcad.options.builds import check_yield
+from tbcad.options.captures import Optics
 from tbcad.tolerancing.margin import (
     STEP_MM,
     SeeingPixels,
@@ -110,15 +111,16 @@ def costs_text(costs: dict[str, SeeingPixels]) -> str:
     return f"pixels of a virtual camera that see the object, median: {', '.join(each)}"
 
 
-def ssim_costs(made: ProcessDesign) -> dict[str, float]:
+def ssim_costs(made: ProcessDesign, optics: Optics = "real") -> dict[str, float]:
     """Mean SSIM of views as designed: with these margins, and with none."""
-    return view_ssims({"with these margins": made.spec, "with none": with_margin(made.spec, 0.0)})
+    specs = {"with these margins": made.spec, "with none": with_margin(made.spec, 0.0)}
+    return view_ssims(specs, optics)
 
 
-def ssim_text(costs: dict[str, float]) -> str:
+def ssim_text(costs: dict[str, float], optics: Optics = "real") -> str:
     """The same in words."""
     each = (f"{ssim:.3f} {words}" for words, ssim in costs.items())
-    return f"SSIM of views of the knot, designed: {', '.join(each)}"
+    return f"SSIM of views of the knot, designed, {optics} optics: {', '.join(each)}"
 
 
 def _worst_coverage(errors: Errors, models: EdgeModels) -> Floats:

@@ -73,8 +73,8 @@ def _sentences(analysis: Analysis) -> Iterator[str]:
             yield _margins_sentence(analysis)
     ssim = {name: values.mean() for name, values in vars(analysis.sharpness).items()}
     yield (
-        f"Pictures: SSIM {ssim['designed']:.3f} as designed, {ssim['uncalibrated']:.3f} "
-        f"without calibration, {ssim['calibrated']:.3f} with it."
+        f"Pictures by {analysis.options.optics} optics: SSIM {ssim['designed']:.3f} as designed, "
+        f"{ssim['uncalibrated']:.3f} without calibration, {ssim['calibrated']:.3f} with it."
     )
     if analysis.process.waviness_um.magnitude:
         spread = spread_dict(analysis)
@@ -153,7 +153,11 @@ def report_dict(analysis: Analysis) -> dict[str, Any]:
         "margin_needed_mm": margin.mm,
         "margin_reason": margin.reason,
         "processes": _process_table(analysis).records(),
-        "ssim": {**ssim, "calibration_residual_mrad": options.calibrated_mrad},
+        "ssim": {
+            **ssim,
+            "optics": options.optics,
+            "calibration_residual_mrad": options.calibrated_mrad,
+        },
         "ray_spread_mm": spread_dict(analysis),
         "prototype": prototype
         and {

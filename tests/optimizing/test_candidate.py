@@ -26,6 +26,7 @@ from tbcad.optimizing.candidate import (
     placed,
     size_of,
 )
+from tbcad.options.captures import Optics
 from tbcad.studies.ssim import ssim
 
 FEW_PIXELS = ("n=4", "width_px=416", "height_px=310")
@@ -84,21 +85,35 @@ def few_views(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("method", "of_study"),
-    [("nearest", BY_NEAREST), pytest.param("field", BY_FIELD, marks=pytest.mark.slow)],
+    ("method", "of_study", "optics"),
+    [
+        ("nearest", BY_NEAREST, "ideal"),
+        ("nearest", BY_NEAREST, "real"),
+        pytest.param("field", BY_FIELD, "ideal", marks=pytest.mark.slow),
+    ],
 )
 def test_it_is_the_figure_of_the_study(
-    method: str, of_study: ViewMethod, monkeypatch: pytest.MonkeyPatch
+    method: str, of_study: ViewMethod, optics: Optics, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(picture, "QUICK", Settings(levels=(Level(24, 1),), batch=3000))
     viewpoints = viewpoints_around((15.0,), 1, 640.0)
     wide = SPEC.camera.model_copy(update={"hfov_deg": 89.0})
     fixed = SPEC.model_copy(update={"camera": wide})  # as the study has it for the paper's optics
-    study = ssim(fixed, built_in_object(60.0), (Sensor(208, 155),), viewpoints, of_study)
+    width, height = (104, 77) if optics == "real" else (208, 155)  # a quarter of the pixels
+    coarse = {"width_px": width, "height_px": height}
+    studied = fixed.model_copy(update={"camera": wide.model_copy(update=coarse)})
+    sensors, knot = (Sensor(width, height),), built_in_object(60.0)
+    study = ssim(studied, knot, sensors, viewpoints, of_study, optics=optics)
     expected = study.tables[0].numbers("ssim").mean()
-    assert mean_ssim(design(fixed), method) == expected
+    assert mean_ssim(design(fixed), method, optics) == expected
     assert 0.3 < expected < 0.99
-    assert ("; field." in study.tables[0].notes[0]) == (method == "field")
+    assert f"; {method}; {optics} optics." in study.tables[0].notes[0]
+
+
+def test_a_lens_that_blurs_makes_worse_views() -> None:
+    """A pupil of 0.85 mm before pixels of 8 times the paper's design; nothing else is known."""
+    made = design(SPEC)
+    assert mean_ssim(made, optics="real") < mean_ssim(made, optics="ideal") - 0.002
 
 
 @pytest.mark.parametrize(("size_mm", "measured"), [(300.0, True), (200.0, False)])

@@ -30,7 +30,7 @@ BEST = (123.0, -140.0, 111.5, 1.3, 1.15)
 
 
 def closed_form(
-    spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
+    spec: Spec, ssim_within: MachineLimits | None, place: Place, **_: str
 ) -> DesignCandidate:
     """Pixels are most at BEST; the machine grows with x; there is none with a small axis."""
     if place[2] < 60:
@@ -133,7 +133,7 @@ def test_ssim_is_measured_where_an_earlier_search_did_not(
     again: list[Place] = []
 
     def with_ssim(
-        spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
+        spec: Spec, ssim_within: MachineLimits | None, place: Place, **_: str
     ) -> DesignCandidate:
         again.append(place)
         one = closed_form(spec, ssim_within, place)

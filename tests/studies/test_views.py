@@ -2,15 +2,19 @@
 
 from dataclasses import replace
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pytest
 from scipy.stats import ttest_rel
 
 from tbcad.common.results import Study, study_files
+from tbcad.core.camera.sheet import write_camera_sheet
+from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.capture.photograph import Sensor
+from tbcad.light.simulate.capture.real import RealOptics
 from tbcad.light.simulate.scene.object import built_in_object, patterned_ball
 from tbcad.light.simulate.scene.ray_casting import LAMPS, cast_rays, prepared_scene
 from tbcad.light.simulate.scene.reflector import read_export
@@ -20,6 +24,7 @@ from tbcad.light.simulate.views.viewpoints import (
     viewpoints_around,
     viewpoints_over_hemisphere,
 )
+from tbcad.records.tables import BallRow
 from tbcad.studies.balance import balance
 from tbcad.studies.low_pass import BlurOptions, low_pass
 from tbcad.studies.paper import balanced_sensors
@@ -130,6 +135,28 @@ def test_low_pass_filter_blurs_the_views(export_folder: Path) -> None:
     (shell,) = means.where(geometry="shell", view="aperture").records()
     assert shell["blur_mm"] < none["blur_mm"]
     assert len(study_files(found)) == 5
+
+
+@pytest.mark.slow
+def test_real_optics_of_shell_and_prototype(
+    export_folder: Path, low_resolution_design: MirrorDesign, tmp_path: Path
+) -> None:
+    """The lens blurs both, and a filter as well blurs more; the balls scatter as their grades."""
+    folder = Path(copytree(export_folder, tmp_path / "build"))
+    write_camera_sheet(folder, low_resolution_design.arrays[0], 30.0)
+    export, knot = read_export(folder), built_in_object(60.0)
+    viewpoints = SmallViews(**vars(viewpoints_around((30.0,), 1, 640.0)))
+    ideal, real = (
+        prototype_vs_shell(export, knot, viewpoints, BY_NEAREST, 1, optics=optics).tables[0]
+        for optics in ("ideal", "real")
+    )
+    for name in ("shell_ssim", "prototype_ssim"):
+        assert real.numbers(name).mean() < ideal.numbers(name).mean()
+    shell, balls, narrow, wide = BlurOptions((1.0, 3.0)).real_cases(export)
+    both = [one.samples for one in (shell, balls, narrow, wide)]
+    assert all(isinstance(one, RealOptics) for one in both)
+    assert [one.filter_px for one in both] == [0, 0, 1, 3]  # type: ignore[union-attr]
+    assert len(both[1].roughness_nm) == len(BallRow.read(export_folder))  # type: ignore[union-attr]
 
 
 def test_viewpoints_around_the_object() -> None:

@@ -88,11 +88,14 @@ def diffraction_mtf(share: Floats) -> Floats:
     return np.asarray(2 / np.pi * (np.arccos(v) - v * np.sqrt(1 - v**2)))
 
 
-def pixel_kernel(cutoff: float, fine: int = FINE, reach: int = KERNEL_PX) -> Floats:
+def pixel_kernel(
+    cutoff: float, fine: int = FINE, reach: int = KERNEL_PX, filter_px: float = 0.0
+) -> Floats:
     """Shares (2 k, 2 k) of fine samples in a pixel behind its aperture and a pupil.
 
     The pixel is all sensitive; `cutoff`: cycles a pixel. k = fine (reach + 1/2) samples lie on each
-    side of its middle. What they lack of 1 is light of the Airy pattern farther away.
+    side of its middle. What they lack of 1 is light of the Airy pattern farther away. `filter_px`:
+    separation of the four images of an optical low-pass filter.
     """
     half = reach * fine + fine / 2
     at = (np.arange(2 * half) + 0.5 - half) / fine
@@ -100,6 +103,7 @@ def pixel_kernel(cutoff: float, fine: int = FINE, reach: int = KERNEL_PX) -> Flo
     f = (np.arange(FREQUENCIES) + 0.5) * step - fine / 2
     fx, fy = np.meshgrid(f, f)
     contrast = np.sinc(fx) * np.sinc(fy) * diffraction_mtf(np.hypot(fx, fy) / cutoff)
+    contrast *= np.cos(np.pi * filter_px * fx) * np.cos(np.pi * filter_px * fy)
     wave = np.cos(2 * np.pi * at[:, None] * f)
     return np.asarray(wave @ contrast @ wave.T * (step / fine) ** 2)
 

@@ -4,17 +4,23 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 
-from tbcad.light.simulate.capture.light_field import LightField, light_field_in_memory
+from tbcad.core.mirrors.array import MirrorDesign
+from tbcad.light.simulate.capture.light_field import (
+    LightField,
+    light_field_in_memory,
+    traced_light_field,
+)
 from tbcad.light.simulate.capture.photograph import CameraPhotographs, RowBand, Samples, photograph
 from tbcad.light.simulate.capture.real import RealOptics, real_photograph
 from tbcad.light.simulate.prototype.merge import merge_run
 from tbcad.light.simulate.prototype.run import ball_reflector, prototype_runs, read_plan
+from tbcad.light.simulate.real_camera import design_optics
 from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import exact_tracer
-from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
+from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, reflectors
 from tbcad.light.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.light.simulate.scene.upper_lamps import upper_screen
-from tbcad.options.captures import Geometry
+from tbcad.options.captures import Geometry, Optics
 from tbcad.types import Progress
 
 
@@ -40,18 +46,47 @@ def camera_photographs(
             (ball_reflector(run), partial(merge_run, run, seen, samples, progress, wider))
             for run in both
         ]
-    if isinstance(samples, RealOptics):
-        return [
-            (one, partial(real_photograph, one, scene, samples, progress))
-            for one in export.reflectors
-        ]
-    shells = read_shell_meshes(export) if geometry == "mesh" else None
+    if geometry == "spheres" or isinstance(samples, RealOptics):
+        return sphere_photographs(export.reflectors, scene, samples, progress)
+    shells = read_shell_meshes(export)
 
     def photograph_of(reflector: Reflector) -> Iterable[RowBand]:
-        trace = mesh_tracer(shells, reflector) if shells else exact_tracer(reflector)
+        trace = mesh_tracer(shells, reflector)
         return photograph(reflector.camera, trace, scene, samples, progress)
 
     return [(reflector, partial(photograph_of, reflector)) for reflector in export.reflectors]
+
+
+def sphere_photographs(
+    both: Iterable[Reflector],
+    scene: Scene,
+    samples: Samples | RealOptics = 1,
+    progress: Progress = lambda _: None,
+) -> CameraPhotographs:
+    """Cameras before exact spheres, each with what takes its photograph."""
+
+    def photograph_of(one: Reflector) -> Iterable[RowBand]:
+        if isinstance(samples, RealOptics):
+            return real_photograph(one, scene, samples, progress)
+        return photograph(one.camera, exact_tracer(one), scene, samples, progress)
+
+    return [(one, partial(photograph_of, one)) for one in both]
+
+
+def design_light_field(designed: MirrorDesign, scene: Scene, optics: Optics) -> LightField:
+    """The light field of a design: of ideal optics its pixels are traced when they are read."""
+    if optics == "ideal":
+        return traced_light_field(designed, scene)
+    capture_mm = designed.spec.optics.capture_diameter_mm
+    return sphere_light_field(reflectors(designed), scene, capture_mm, design_optics(designed))
+
+
+def sphere_light_field(
+    both: Iterable[Reflector], scene: Scene, capture_mm: float, samples: Samples | RealOptics = 1
+) -> LightField:
+    """The light field in memory of cameras before exact spheres."""
+    bands = ((at, take()) for at, take in sphere_photographs(both, scene, samples))
+    return light_field_in_memory(bands, capture_mm)
 
 
 def photographed(

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tbcad.core.camera.requirements import MIRROR_REFLECTANCE
+from tbcad.core.camera.requirements import MIRROR_REFLECTANCE, camera_requirements
+from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.lens import WAVELENGTH_MM, PupilLens
 from tbcad.core.optics.mirror_light import REFLECTED
 from tbcad.core.optics.reflection import roughness_nm, scattered_share
@@ -22,6 +23,17 @@ LEFT_OUT_OF_RUNS = (
     "light of the object that meets two mirrors, light of LEDs on the object",
     *LEFT_OUT[1:3],
 )
+
+
+def design_optics(designed: MirrorDesign) -> RealOptics:
+    """The lens that a design requires before its shell's mirrors: `real_optics` if none is listed.
+
+    Polished as ordered, reflectance and noise as there.
+    """
+    radius = designed.spec.optics.capture_diameter_mm / 2
+    needed = camera_requirements(designed.arrays[0], radius)
+    lens = PupilLens(needed.pupil_mm, needed.focus_mm)
+    return RealOptics(lens, REFLECTED, np.array([roughness_nm()]))
 
 
 def real_optics(

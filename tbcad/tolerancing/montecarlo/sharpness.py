@@ -17,16 +17,19 @@ from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.pedestals.cells import GrooveWalls
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import Spec
-from tbcad.light.simulate.capture.light_field import CameraFrame, LightField, light_field_in_memory
-from tbcad.light.simulate.capture.photograph import BAND_ROWS, photograph
+from tbcad.light.simulate.camera_photographs import design_light_field, sphere_light_field
+from tbcad.light.simulate.capture.light_field import CameraFrame, LightField
+from tbcad.light.simulate.capture.photograph import BAND_ROWS
+from tbcad.light.simulate.capture.real import RealOptics
 from tbcad.light.simulate.parallel import chunks, in_threads
 from tbcad.light.simulate.scene.object import built_in_object
-from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
-from tbcad.light.simulate.scene.rays import exact_tracer
-from tbcad.light.simulate.scene.reflector import Reflector, SubstitutedReflector, reflectors
+from tbcad.light.simulate.scene.ray_casting import Scene
+from tbcad.light.simulate.scene.real_scene import scene_by
+from tbcad.light.simulate.scene.reflector import Reflector, SubstitutedReflector
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.synthesis import synthesise
 from tbcad.light.simulate.views.viewpoints import image_quality, pinhole_targets, viewpoints_around
+from tbcad.options.captures import Optics
 from tbcad.tolerancing.montecarlo.draws import ShellDraws
 from tbcad.types import Bytes, Floats, Ints, Progress
 
@@ -41,6 +44,7 @@ class ReferenceViews:
     capture_mm: float  # diameter of the capture sphere
     views: list[Camera]  # viewpoints, v of them
     truths: list[Bytes]  # pictures of a real camera there, (h, w, 3) each
+    taken_by: int | RealOptics = 1  # photographs: rays of a pixel, or the lens
 
 
 @dataclass(frozen=True)
@@ -65,15 +69,21 @@ def sharpness(
 
     The residual is of a mirror's direction, per axis, radians.
     """
-    designed = _light_field(cameras, scene, reference.capture_mm)
+    light_field = partial(
+        sphere_light_field,
+        scene=scene,
+        capture_mm=reference.capture_mm,
+        samples=reference.taken_by,
+    )
+    designed = light_field(cameras)
     rows = [_ssim(designed, reference)]
     for k in range(len(builds[0])):
         progress(f"build {k + 1} of {len(builds[0])}")
         a, b = (built_reflector(at, draws, k) for at, draws in zip(cameras, builds, strict=True))
-        built = _light_field((a, b), scene, reference.capture_mm)
+        built = light_field((a, b))
         calibrated = _with_residual(built, residual, (seed, k))
-        for light_field in (_with_rays_of(designed, built), calibrated):
-            rows.append(_ssim(light_field, reference))
+        for known in (_with_rays_of(designed, built), calibrated):
+            rows.append(_ssim(known, reference))
     table = np.array(rows)
     return Sharpness(table[0], table[1::2], table[2::2])
 
@@ -132,13 +142,6 @@ def _view(view: Camera, draws: ShellDraws, build: int) -> Camera:
     )
 
 
-def _light_field(
-    cameras: tuple[Reflector, Reflector], scene: Scene, capture_mm: float
-) -> LightField:
-    photographs = ((at, photograph(at.camera, exact_tracer(at), scene)) for at in cameras)
-    return light_field_in_memory(photographs, capture_mm)
-
-
 def _with_rays_of(rays: LightField, pictures: LightField) -> LightField:
     """The pictures of one light field with the rays of another."""
     colour = {name: frame.planes["colour"] for name, frame in pictures.frames.items()}
@@ -182,18 +185,25 @@ def _ssim(source: LightField, reference: ReferenceViews) -> Floats:
 
 
 def reference_views(
-    scene: Scene, capture_mm: float, progress: Progress = lambda _: None
+    scene: Scene,
+    capture_mm: float,
+    progress: Progress = lambda _: None,
+    taken_by: int | RealOptics = 1,
 ) -> ReferenceViews:
     """The views that are compared, with their truths."""
     views = viewpoints_around(*VIEWPOINTS).cameras(capture_mm)
-    return ReferenceViews(capture_mm, views, pinhole_targets(scene, views, progress).truths)
+    truths = pinhole_targets(scene, views, progress).truths
+    return ReferenceViews(capture_mm, views, truths, taken_by)
 
 
-def view_ssims(specs: dict[str, Spec]) -> dict[str, float]:
+def view_ssims(specs: dict[str, Spec], optics: Optics = "ideal") -> dict[str, float]:
     """Mean SSIM of views of the built-in object by designs of one capture diameter."""
     capture_mm = next(iter(specs.values())).optics.capture_diameter_mm
-    scene = prepared_scene(built_in_object(capture_mm))
+    scene = scene_by(optics, built_in_object(capture_mm))
     reference = reference_views(scene, capture_mm)
-    made = {words: reflectors(design(spec)) for words, spec in specs.items()}
-    sources = {words: _light_field(one, scene, capture_mm) for words, one in made.items()}
-    return {words: float(_ssim(one, reference).mean()) for words, one in sources.items()}
+
+    def mean(spec: Spec) -> float:
+        source = design_light_field(design(spec), scene, optics)
+        return float(_ssim(source, reference).mean())
+
+    return {words: mean(spec) for words, spec in specs.items()}

@@ -17,7 +17,7 @@ from tests.exported_files import read_csv
 
 
 def closed_form(
-    spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
+    spec: Spec, ssim_within: MachineLimits | None, place: Place, **_: str
 ) -> DesignCandidate:
     """More pixels with a larger ellipsoid, in place of mirrors, which take long."""
     axis = place[2]
@@ -71,7 +71,7 @@ def test_in_python(tmp_path: Path) -> None:
 
 def test_a_search_that_was_stopped_goes_on(monkeypatch: pytest.MonkeyPatch, cli: Command) -> None:
     def stopped(
-        spec: Spec, ssim_within: MachineLimits | None, place: Place, method: str = "nearest"
+        spec: Spec, ssim_within: MachineLimits | None, place: Place, **_: str
     ) -> DesignCandidate:
         if place[2] > 130:
             raise KeyboardInterrupt

@@ -30,6 +30,15 @@ def test_kernel_is_pixel_and_airy_pattern(frequency: float) -> None:
     assert contrast(pixel_kernel(CUTOFF), frequency) == pytest.approx(closed, abs=0.015)
 
 
+@pytest.mark.parametrize("separation", [0.75, 1.0, 2.0])
+@pytest.mark.parametrize("frequency", [0.15, 0.25, 0.5])
+def test_kernel_behind_a_low_pass_filter(separation: float, frequency: float) -> None:
+    """Two crossed plates: four images at the corners of a square, |cos(pi s f)| of lines pass."""
+    found = contrast(pixel_kernel(CUTOFF, filter_px=separation), frequency)
+    plain = contrast(pixel_kernel(CUTOFF), frequency)
+    assert found == pytest.approx(plain * np.cos(np.pi * separation * frequency), abs=0.015)
+
+
 def test_kernel_holds_most_of_the_light() -> None:
     """Of an Airy pattern 1 - J0^2 - J1^2, some 4 %, is beyond 3.5 pixels."""
     assert pixel_kernel(CUTOFF).sum() == pytest.approx(0.955, abs=0.02)

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.app.cli.app import Work, app, of_design, of_export
+from tbcad.errors import InputError
 from tbcad.options.call import tell_options
+from tbcad.options.captures import Optics
 from tbcad.options.checks import check_is_object
 from tbcad.options.shared import (
     Distance,
@@ -41,6 +43,9 @@ Sensors = Annotated[list[str] | None, typer.Option("--sensor", metavar="WxH")]
 times its width and height (Table II)."""
 Azimuths = Annotated[int, typer.Option(min=1, max=360)]
 """Number of azimuths at each elevation."""
+OpticsOption = Annotated[Optics, typer.Option("--optics")]
+"""Of the photographs. ideal: pinholes; real: the lens that the design requires with its pupil,
+shadows of the object on itself, scatter and noise, as tbcad capture --optics real."""
 
 
 RatiosOption = Annotated[list[str] | None, typer.Option("--ratio", metavar="C:P")]
@@ -125,6 +130,7 @@ def ssim_command(
     method: MethodOfStudy = "nearest",
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
+    optics: OpticsOption = "ideal",
 ) -> Work:
     """Compare views with the ground truth for several sensors, each with its own n (Fig. 9)."""
     check_is_object(object_file, up, unit)
@@ -134,7 +140,7 @@ def ssim_command(
     simulated = _sensors(sensors, spec)
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     subject = _subject(object_file, spec.optics.capture_diameter_mm, paint, up, unit)
-    return partial(ssim, spec, subject, simulated, places, _by(method))
+    return partial(ssim, spec, subject, simulated, places, _by(method), optics=optics)
 
 
 NsOption = Annotated[list[int] | None, typer.Option("--n", min=2, max=60)]
@@ -151,12 +157,18 @@ def balance_command(
         int, typer.Option(min=1, max=1000, help="Number of viewpoints, evenly over the hemisphere.")
     ] = 12,
     distance: Distance = 640.0,
+    optics: OpticsOption = "ideal",
 ) -> Work:
     """Find which balance of virtual cameras and pixels is best for which object (section 6)."""
     from tbcad.studies.balance import SUBDIVISIONS, balance
 
     wanted = tuple(sorted(set(ns or SUBDIVISIONS)))
-    return partial(balance, spec, wanted, views, distance, _by(method))
+    return partial(balance, spec, wanted, views, distance, _by(method), optics=optics)
+
+
+SamplesOption = Annotated[int | None, typer.Option(min=1, max=8, metavar="N")]
+"""Anti-aliasing of ideal photographs: a pixel is the mean of N x N rays; by default 3, with a
+low-pass filter 2."""
 
 
 @study.command("prototype")
@@ -170,11 +182,11 @@ def prototype_command(
     method: MethodOfStudy = "nearest",
     azimuths: Azimuths = 4,
     distance: Distance = 640.0,
-    samples: Annotated[
-        int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
-    ] = 3,
+    samples: SamplesOption = None,
+    optics: OpticsOption = "ideal",
 ) -> Work:
     """Compare views from the prototype's merged photographs with those of the full shell."""
+    _check_real(optics, {"--samples": samples})
     check_is_object(object_file, up, unit)
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.light.simulate.views.viewpoints import ELEVATIONS_DEG, viewpoints_around
@@ -183,7 +195,8 @@ def prototype_command(
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = _subject(object_file, export.capture_mm, paint, up, unit)
-    return partial(prototype_vs_shell, export, subject, places, _by(method), samples)
+    by = _by(method)
+    return partial(prototype_vs_shell, export, subject, places, by, samples or 3, optics=optics)
 
 
 FilterPxOption = Annotated[list[float] | None, typer.Option(min=0.01, max=16, metavar="PX")]
@@ -205,11 +218,11 @@ def low_pass_command(
     distance: Distance = 640.0,
     filter_px: FilterPxOption = None,
     lens_px: LensPxOption = None,
-    samples: Annotated[
-        int, typer.Option(min=1, max=8, help="Anti-aliasing: a pixel is the mean of N x N rays.")
-    ] = 2,
+    samples: SamplesOption = None,
+    optics: OpticsOption = "ideal",
 ) -> Work:
     """Blur the prototype's photographs by an optical low-pass filter or a lens (5.3, Fig. 11)."""
+    _check_real(optics, {"--samples": samples, "--lens-px": lens_px})
     check_is_object(object_file, up, unit)
     from tbcad.light.simulate.scene.reflector import read_export
     from tbcad.light.simulate.views.viewpoints import viewpoints_around
@@ -217,12 +230,12 @@ def low_pass_command(
 
     usual = BlurOptions()
     options = BlurOptions(
-        tuple(filter_px or usual.separations_px), tuple(lens_px or usual.lens_px), samples
+        tuple(filter_px or usual.separations_px), tuple(lens_px or usual.lens_px), samples or 2
     )
     places = viewpoints_around(ELEVATIONS_DEG, azimuths, distance)
     export = read_export(folder)
     subject = _subject(object_file, export.capture_mm, paint, up, unit)
-    return partial(low_pass, export, subject, places, options)
+    return partial(low_pass, export, subject, places, options, optics=optics)
 
 
 @study.command("calibration")
@@ -234,6 +247,13 @@ def calibration_command(folder: Path) -> Work:
 
     export = read_export(folder)
     return partial(calibration_study, export)
+
+
+def _check_real(optics: Optics, ideal: dict[str, object]) -> None:
+    """Refuse options of ideal photographs with real ones: those have a lens and its rays."""
+    for option, given in ideal.items():
+        if optics == "real" and given:
+            raise InputError(f"--optics real is not for {option}: leave one of both out")
 
 
 def _by(method: MethodOfStudy) -> "ViewMethod":

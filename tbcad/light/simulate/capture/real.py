@@ -62,10 +62,11 @@ class RealOptics:
     ray_share: float = RAY_SHARE  # of the pupil's diameter that rays go through
     fine: int = FINE  # rays of a pixel along its sides
     seed: int = 0  # of the noise
+    filter_px: float = 0.0  # separation of the four images of a low-pass filter; 0: none
 
     def kernel(self, pitch: float) -> Floats:
         """Shares of fine samples in a pixel so wide at unit distance, as of `pixel_kernel`."""
-        return pixel_kernel(self.lens.cutoff(pitch), self.fine)
+        return pixel_kernel(self.lens.cutoff(pitch), self.fine, filter_px=self.filter_px)
 
 
 @dataclass(frozen=True)

@@ -23,16 +23,23 @@ from tbcad.light.simulate.scene.ray_casting import (
     LAMPS,
     Scene,
     embree_scene,
+    prepared_scene,
     sky_light,
 )
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.light.simulate.scene.shell_lamps import mirror_light
+from tbcad.options.captures import Optics
 
 AnyLamps = RectangularLamps | Lamps | None
 
 
+def scene_by(optics: Optics, subject: SceneObject) -> Scene:
+    """An object in the built-in light: for real optics with its shadows on itself."""
+    return real_scene(None, subject, None) if optics == "real" else prepared_scene(subject)
+
+
 def real_scene(
-    export: ExportedDesign, subject: SceneObject, lamps: AnyLamps, gloss: float | None = None
+    export: ExportedDesign | None, subject: SceneObject, lamps: AnyLamps, gloss: float | None = None
 ) -> Scene:
     """An object in the light of a prototype's lamps, of a shell's, or in the built-in light: None.
 
@@ -45,7 +52,7 @@ def real_scene(
     sources, rest = _built_in_light()
     if isinstance(lamps, RectangularLamps):
         sources, rest = lamp_sources(lamps), lambda points, _: np.zeros(len(points))
-    elif lamps is not None:
+    elif lamps is not None and export is not None:
         by_mirrors = mirror_light(export, lamps)
         directions = np.concatenate([one.u for one in export.reflectors])
 
