@@ -21,11 +21,12 @@ from tbcad.cad.formats.mesh_files import write_3mf, write_stl
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.solids import pyramid, sphere
+from tbcad.common.reuse import kept
 from tbcad.common.schedule import Submit
 from tbcad.core.camera.sheet import write_camera_sheet
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorDesign
-from tbcad.core.spec.design import Spec
+from tbcad.core.spec.design import Spec, without_sections
 from tbcad.prototype.arrangement import PrototypeModel, arrangements
 from tbcad.prototype.assembly_steps.book import write_book
 from tbcad.prototype.assembly_steps.machine import AssembledMachine
@@ -81,7 +82,8 @@ def export_prototype(
     built = build_prototype_model(arrangements(design), progress, submit)
     spec = built.spec
     progress("prototype: files")
-    prints = [submit(write_part, folder, part, spec) for part in built.printed]
+    own = without_sections(spec, "optics", "camera", "mirrors", "shell", "prototype")
+    prints = [submit(write_part, folder, part, own) for part in built.printed]
     if shroud := built.shroud:
         for panel in shroud.panels:
             submit(write_dxf, folder / f"{panel.name}.dxf", pattern(panel, shroud.sheet))
@@ -114,6 +116,7 @@ def export_prototype(
     return spec
 
 
+@kept("files of printed parts")
 def write_part(folder: Path, part: PrintedPart, spec: Spec) -> tuple[float, float]:
     """STEP as assembled, STL and 3MF on the printer's bed; an estimate of its print."""
     mesh, solid = part_mesh(part), Solid(part.name, part.solid.shape, ())
