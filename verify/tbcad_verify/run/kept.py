@@ -188,20 +188,21 @@ def digest(value: object) -> str:
 
 
 class _Canonical(pickle.Pickler):
-    """Values alone: sets in order, no values that objects have worked out of their own."""
+    """Values alone: sets in order, files by content, nothing that objects have worked out since."""
 
-    def reducer_override(self, value: Any) -> Any:
+    def persistent_id(self, value: Any) -> Any:
+        """Stands for a value that is not written as it is; None for all others."""
         kind = type(value)
         if kind in (set, frozenset):
-            return _Canonical, (kind.__name__, sorted(map(digest, value)))
+            return kind.__name__, sorted(map(digest, value))
         if isinstance(value, Path):
-            return _Canonical, (hashlib.sha256(value.read_bytes()).hexdigest(),)
+            return kind.__name__, hashlib.sha256(value.read_bytes()).hexdigest()
         if kind.__module__ == "trimesh.base":
-            return _Canonical, (kind.__name__, np.array(value.vertices), np.array(value.faces))
+            return kind.__name__, digest([np.array(value.vertices), np.array(value.faces)])
         if names := _worked_out_later(cast("Any", kind)):
             rest = {name: one for name, one in vars(value).items() if name not in names}
-            return _Canonical, (kind, rest)
-        return NotImplemented
+            return kind.__module__, kind.__qualname__, digest(rest)
+        return None
 
 
 @cache
