@@ -46,14 +46,14 @@ def area(disc: Disc) -> float:
 def write(folder: Path, text: str) -> int:
     calls.append(text)
     assert not list(folder.iterdir())  # nothing of another stage can be read
-    (folder / "text.txt").write_text(text)
+    (folder / "text.txt").write_text(text, encoding="utf-8")
     return len(text)
 
 
 @kept("contents")
 def content(file: Path) -> str:
     calls.append(file)
-    return file.read_text()
+    return file.read_text(encoding="utf-8")
 
 
 @kept("stages", heard=True, sure=lambda found: found != "lost")
