@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import io
 import os
 import pickle
 import tempfile
@@ -180,11 +179,22 @@ def _is_folder(argument: object) -> bool:
 
 def digest(value: object) -> str:
     """SHA-256 of a value: of equal values equal, whichever of their objects are the same."""
-    written = io.BytesIO()
+    written = _Hashed()
     pickler = _Canonical(written, protocol=5)
     pickler.fast = True  # no references to what came before: only values count
     pickler.dump(value)
-    return hashlib.sha256(written.getbuffer()).hexdigest()
+    return written.found.hexdigest()
+
+
+class _Hashed:
+    """A file of which only the digest is kept."""
+
+    def __init__(self) -> None:
+        self.found = hashlib.sha256()
+
+    def write(self, data: bytes) -> int:
+        self.found.update(data)
+        return len(data)
 
 
 class _Canonical(pickle.Pickler):
