@@ -16,7 +16,7 @@ from tbcad_verify.run.kept import Store, kept
 __all__ = ["code_digest", "kept", "store", "told"]
 
 VARIABLE = "TBCAD_CACHE"  # the folder, "" for none; by default tbcad in the user's cache
-LIMIT = 2 << 30  # bytes that are kept: some twenty builds at n = 18
+LIMIT = 2 << 30  # bytes that are kept: some ten builds at n = 18
 
 
 def store(fresh: bool) -> Store:

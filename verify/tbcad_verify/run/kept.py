@@ -21,7 +21,6 @@ from functools import cache, cached_property, wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-import numpy as np
 
 Work = TypeVar("Work", bound=Callable[..., Any])
 DIGEST = 32  # bytes of a SHA-256
@@ -208,7 +207,9 @@ class _Canonical(pickle.Pickler):
         if isinstance(value, Path):
             return kind.__name__, hashlib.sha256(value.read_bytes()).hexdigest()
         if kind.__module__ == "trimesh.base":
-            return kind.__name__, digest([np.array(value.vertices), np.array(value.faces)])
+            from numpy import array  # here: processes that need none begin without
+
+            return kind.__name__, digest([array(value.vertices), array(value.faces)])
         if names := _worked_out_later(cast("Any", kind)):
             rest = {name: one for name, one in vars(value).items() if name not in names}
             return kind.__module__, kind.__qualname__, digest(rest)
