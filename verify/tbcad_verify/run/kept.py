@@ -21,7 +21,6 @@ from functools import cache, cached_property, wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-
 Work = TypeVar("Work", bound=Callable[..., Any])
 DIGEST = 32  # bytes of a SHA-256
 PREFIX, PARTIAL = "kept-", ".partial"  # of names in a store; the second while one is written
