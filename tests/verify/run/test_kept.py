@@ -92,6 +92,8 @@ def test_equal_arguments_are_worked_out_once(store: Store) -> None:
     assert times == 0
     assert found.tolist() == [0, 1, 4, 9]
     assert store.reused == {"squares"}
+    large = np.zeros((100_000, 3))  # which is not written by parts
+    assert [called(store, squared, one)[1] for one in (large, large + 0, large.T)] == [1, 0, 1]
 
 
 def test_without_a_store_everything_is_worked_out() -> None:

@@ -19,7 +19,10 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cache, cached_property, wraps
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 Work = TypeVar("Work", bound=Callable[..., Any])
 DIGEST = 32  # bytes of a SHA-256
@@ -190,9 +193,8 @@ class _Hashed:
     def __init__(self) -> None:
         self.found = hashlib.sha256()
 
-    def write(self, data: bytes) -> int:
+    def write(self, data: ReadableBuffer) -> None:
         self.found.update(data)
-        return len(data)
 
 
 class _Canonical(pickle.Pickler):
