@@ -14,8 +14,8 @@ from timing import Figure, Row, at_most
 COMMAND = "from tbcad.app.cli import main; main()"  # what the installed program does
 ENDS = {0: "done", 1: "done, the verification fails"}
 REFUSED = 2
-INSTALLED = {"PYTHONSAFEPATH": "1"}
-"""Environment in which the interpreter's own tbcad is found, not that of the working directory."""
+INSTALLED = {"PYTHONSAFEPATH": "1", "TBCAD_CACHE": ""}
+"""The interpreter's own tbcad, not that of the working directory; builds that reuse nothing."""
 CRASHED = b"Traceback (most recent call last)"  # a crash exits with 1, too
 MEGABYTE = 1e6
 

@@ -12,6 +12,8 @@ from hypothesis import HealthCheck, settings
 # As tbcad's commands do, before numpy is loaded: each core has a process of tests already, in which
 # threads of the linear algebra would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Tests replace functions, which no digest of the code tells: nothing is kept between builds.
+os.environ["TBCAD_CACHE"] = ""
 
 from tbcad.app.cli import run
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign

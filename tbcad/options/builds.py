@@ -145,6 +145,8 @@ class BuildOptions(Call):
     """With --process: share of simulated builds that must reach the target; by default 0.99."""
     verify: bool = True
     """Verify the files after they are written."""
+    fresh: bool = False
+    """Work everything out, and use nothing that earlier builds have kept."""
     force: Force = False
 
 

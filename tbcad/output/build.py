@@ -14,7 +14,7 @@ from tbcad.common.schedule import Submit
 from tbcad.core.camera.sheet import RigLight, write_camera_sheet
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.record import write_record
-from tbcad.core.spec.design import Spec
+from tbcad.core.spec.design import Spec, without_sections
 from tbcad.core.spec.errors import SpecError
 from tbcad.output.manifest import write_manifest
 from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
@@ -68,15 +68,16 @@ def write_export(
     # Refused before anything is written.
     mandrel = design_mandrel(design) if design.spec.shell.negative and SHELL in parts else None
     export = Export(design.spec, tuple(part for part in PARTS if part in parts))
-    lamps = None
+    lamps, own = None, without_sections(design.spec, "prototype", "printer")
+    shells = replace(design, spec=own)  # which do not follow from the rest
     if SHELL in parts:
         envelope = shell_envelope(design)  # refuses flanges that do not fit
         lamps = _lamps(design, folder, submit_file)
-        submit_file(write_shell_meshes, design, envelope, folder)
+        submit_file(write_shell_meshes, shells, envelope, folder)
         if PROTOTYPE in parts:
-            submit_file(write_shell_solids, design, envelope, folder)
+            submit_file(write_shell_solids, shells, envelope, folder)
         else:
-            write_shell_solids(design, envelope, folder, progress)
+            write_shell_solids(shells, envelope, folder, progress)
     # The prototype's light and mount are in its own, which replaces it.
     light, radius = (
         RigLight(lamps.lux[1] if lamps else None),
@@ -96,7 +97,7 @@ def write_export(
         if SHELL in parts:
             progress("shells")
     if mandrel:
-        submit_file(write_mandrels, design, mandrel, folder)
+        submit_file(write_mandrels, shells, mandrel, folder)
     for future in pending:
         future.result()
     if mandrel and mandrel.draft.angle < 0:

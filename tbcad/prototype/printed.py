@@ -32,6 +32,7 @@ from tbcad.cad.kernel.solids import (
     solids,
     to_bytes,
 )
+from tbcad.common.reuse import kept
 from tbcad.core.geometry.primitives import Component, Cylinder, Primitive, Prism, Revolved, Slot
 from tbcad.core.geometry.rotations import unit_circle
 from tbcad.core.geometry.vectors import norm
@@ -240,6 +241,7 @@ def _net(component: Component) -> Manifold:
     return mesh_difference(*([primitive_mesh(one) for one in some] for some in bodies))
 
 
+@kept("printed parts")
 def placed_component(component: Component, printer: PrinterSpec, mesh_mm: float) -> PlacedSolid:
     """A component placed on the printer's bed, its mesh within a distance of the surface.
 

@@ -21,6 +21,7 @@ from tbcad.cad.kernel.checks import (
 )
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.solids import faces, one_solid, reversed_faces
+from tbcad.common.reuse import kept
 from tbcad.core.geometry.vectors import FLIP_X
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
 from tbcad.core.mirrors.record import part_files
@@ -38,6 +39,7 @@ DRAFT_DIGITS = 6
 NamedFaces: TypeAlias = list[tuple[str, TopoDS_Face]]
 
 
+@kept("shells")
 def write_shell_meshes(design: MirrorDesign, envelope: Envelope, folder: Path) -> None:
     """Write both shells as STL and 3MF into a folder; the envelope closes camera a's half."""
     mesh = camera_a_mesh(design, envelope)
@@ -52,8 +54,9 @@ def write_half_mesh(folder: Path, files: dict[str, str], mesh: Mesh, array: Mirr
     write_3mf(folder / files["3mf"], files["name"], own_mesh)
 
 
+@kept("shells", heard=True)
 def write_shell_solids(
-    design: MirrorDesign, envelope: Envelope, folder: Path, progress: Progress = lambda _: None
+    design: MirrorDesign, envelope: Envelope, folder: Path, progress: Progress
 ) -> None:
     """Write both shells as STEP; the envelope closes camera a's half; or InvalidSolidError."""
     # The kernel integrates a back to some 1e-6 only, and alike in its mirror image only where the
@@ -211,6 +214,7 @@ def design_mandrel(design: MirrorDesign) -> Mandrel:
     return mandrel_of(design.spec.shell, array.modelled_cells, array.ellipsoid)
 
 
+@kept("mandrels")
 def write_mandrels(design: MirrorDesign, mandrel: Mandrel, folder: Path) -> None:
     """Write both negatives, the mandrel being a's, as STEP, STL and 3MF; or InvalidSolidError."""
     mesh = camera_a_mandrel_mesh(design, mandrel)

@@ -1,19 +1,22 @@
 """Yields that come with every build: a few simulated ones of its shells and of its prototype."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from tbcad_verify.report.as_made import FEW, AsMade, ProcessYield, enough_bad
 
+from tbcad.common.reuse import kept
 from tbcad.core.spec.design import Spec
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
 from tbcad.tolerancing.montecarlo.builds import CameraCoverage, Case, CoverageCase, simulate
-from tbcad.tolerancing.montecarlo.edge_model import EdgeModels, edge_models
+from tbcad.tolerancing.montecarlo.edge_model import edge_models
+from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.process.process import BUILT_IN, load_process, process_errors
 from tbcad.tolerancing.prototype.gravity import read_gravity
-from tbcad.tolerancing.prototype.windows import PrototypeCase, prototype_model
+from tbcad.tolerancing.prototype.windows import PrototypeCase, PrototypeWindows, prototype_model
 from tbcad.types import Progress
 
 BUILDS = FEW  # by a process that may be good; others end when enough of them have failed
@@ -28,10 +31,9 @@ def as_made(
     """Simulate builds of both shells by every built-in process; the same answer every time."""
     if not all((one.mirrors.curvature > 0).all() for one in cameras):
         return AsMade(BUILDS, reason="the mirrors are planar")
-    models, yields = edge_models(cameras), []
-    for name in BUILT_IN:
-        detail(name)
-        yields.append(_shell_yield(models, name, spec))
+    coating, target = spec.mirrors.coating_um, spec.optics.capture_diameter_mm
+    errors = {name: process_errors(load_process(name), coating) for name in BUILT_IN}
+    yields = _shell_yields(cameras, errors, target, detail)
     return AsMade(BUILDS, tuple(sorted(yields, key=lambda one: -one.coverage_mm)))
 
 
@@ -43,13 +45,27 @@ def prototype_as_made(export: ExportedDesign) -> ProcessYield:
     spec, plan = export.spec, read_plan(export)
     model = prototype_model(export.reflectors, plan, read_gravity(export, plan))
     errors = process_errors(load_process(PRINTED_BY), spec.mirrors.coating_um, spec.prototype.caps)
-    return _yield(PrototypeCase(model, errors, SEED).calibrated, PRINTED_BY, export.capture_mm)
+    return _prototype_yield(model, errors, export.capture_mm)
 
 
-def _shell_yield(models: EdgeModels, name: str, spec: Spec) -> ProcessYield:
-    errors = process_errors(load_process(name), spec.mirrors.coating_um)
-    case = CoverageCase(models, errors, SEED, worst_only=True)
-    return _yield(case, name, spec.optics.capture_diameter_mm)
+@kept("simulated builds")
+def _prototype_yield(model: PrototypeWindows, errors: Errors, target_mm: float) -> ProcessYield:
+    return _yield(PrototypeCase(model, errors, SEED).calibrated, PRINTED_BY, target_mm)
+
+
+@kept("simulated builds", heard=True)
+def _shell_yields(
+    cameras: tuple[Reflector, Reflector],
+    errors: Mapping[str, Errors],
+    target_mm: float,
+    detail: Progress,
+) -> list[ProcessYield]:
+    models, yields = edge_models(cameras), []
+    for name, own in errors.items():
+        detail(name)
+        case = CoverageCase(models, own, SEED, worst_only=True)
+        yields.append(_yield(case, name, target_mm))
+    return yields
 
 
 def _yield(case: "Case[Any]", name: str, target_mm: float) -> ProcessYield:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import monotonic
@@ -66,6 +68,21 @@ class BuildPlan:
     process: Process | None  # that edges and margins are chosen for
 
 
+@contextmanager
+def reusing(fresh: bool, answer: Progress) -> Iterator[None]:
+    """Keep what is worked out in the block, use what is kept already, and say what was used."""
+    from tbcad_verify.run.kept import keeping
+
+    from tbcad.common.reuse import LIMIT, store, told
+
+    kept_in = store(fresh)
+    with keeping(kept_in):
+        yield
+    kept_in.prune(LIMIT)
+    if line := told(kept_in):
+        answer(line)
+
+
 def planned(options: BuildOptions) -> BuildPlan:
     """Refuse, before any work, what cannot be built or replaced."""
     from tbcad.output.folder import check_replaceable
@@ -99,7 +116,8 @@ def build(options: BuildOptions) -> Build:
     started, plan = monotonic(), planned(options)
     plan = replace(plan, spec=spec_for_process(plan, options))
     options.progress("mirrors: radii and cells")
-    finished = _build_files(plan, options)
+    with reusing(options.fresh, options.answer):
+        finished = _build_files(plan, options)
     if finished.report is None:
         return finished
     return replace(finished, report=replace(finished.report, seconds=monotonic() - started))

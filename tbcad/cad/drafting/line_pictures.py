@@ -11,6 +11,7 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from tbcad.cad.formats.entities import Layer, Line, Point
+from tbcad.common.reuse import kept
 from tbcad.types import Bools, Floats, Ints
 
 SHARP_RAD = 0.6  # angle between faces that is drawn
@@ -27,6 +28,7 @@ class LinePicture:
     anchors: dict[str, Point]
 
 
+@kept("pictures")
 def line_picture(
     bodies: Mapping[str, trimesh.Trimesh],
     axes: Floats,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tbcad.common.reuse import kept
 from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.vectors import FLIP_X, dot, norm
 from tbcad.core.mirrors.radii import (
@@ -29,7 +30,14 @@ from tbcad.core.optics.windows import (
     parabola_minima,
     samples_about_minima,
 )
-from tbcad.core.spec.design import FIT, MAX_HFOV, CameraSpec, MirrorsSpec, Spec
+from tbcad.core.spec.design import (
+    FIT,
+    MAX_HFOV,
+    CameraSpec,
+    MirrorsSpec,
+    Spec,
+    without_sections,
+)
 from tbcad.core.spec.errors import SpecError
 from tbcad.types import Bools, Floats, Ints, Progress
 
@@ -198,7 +206,7 @@ class MirrorDesign:
 
 def design(spec: Spec, progress: Progress = lambda _: None) -> MirrorDesign:
     """Directions, poses, radii and cells of all mirrors (section 3 of the paper); or SpecError."""
-    array = _half_a(spec, progress)
+    array = _half_a(without_sections(spec, "prototype", "printer"), progress)
     _check_clearance(spec, array)
     hfov = round(float(np.degrees(array.camera.hfov)), HFOV_DIGITS)
     camera = spec.camera.model_copy(update={"hfov_deg": hfov})
@@ -233,7 +241,8 @@ def _in_half_a(u: Floats) -> Bools:
     return np.asarray((u[:, 0] >= 0) & (u[:, 2] >= 0))
 
 
-def _half_a(spec: Spec, progress: Progress = lambda _: None) -> MirrorArray:
+@kept("mirrors", heard=True)
+def _half_a(spec: Spec, progress: Progress) -> MirrorArray:
     optics = spec.optics
     ellipsoid = Ellipsoid(np.array(optics.camera_mm), optics.semi_minor_mm)
     every, faces = numbered_directions(optics.n, optics.stretch)

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tbcad.common.compiled import compiled_loop
+from tbcad.common.reuse import kept
 from tbcad.core.geometry.loop_vectors import Vector, divided, dot, minus, plus_scaled, unit, vector
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.surfaces import Surfaces
@@ -76,6 +77,7 @@ def reflection(centre: Vector, radius: float, lamp: Vector, place: Vector) -> tu
     return point, s**2 * (1 + t * within) * (1 + t * aside)
 
 
+@kept("light")
 def light_by_mirrors(
     lamps: Lamps, mirrors: LitMirrors, places: Floats, normals: Floats, hidden: float = 0.0
 ) -> Floats:

@@ -250,6 +250,14 @@ def spec_with(spec: Spec, **sections: dict[str, object]) -> Spec:
     return spec.model_copy(update=changed)
 
 
+def without_sections(spec: Spec, *names: str) -> Spec:
+    """The spec without some sections, for work that may not follow from them: None in their place.
+
+    Work that reads one fails, instead of being taken for independent of it.
+    """
+    return spec.model_copy(update=dict.fromkeys(names))
+
+
 def _check_capture_sphere(optics: OpticsSpec) -> None:
     radius, to_pinhole = optics.capture_diameter_mm / 2, math.hypot(*optics.camera_mm)
     if radius >= to_pinhole:

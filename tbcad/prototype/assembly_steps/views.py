@@ -11,6 +11,7 @@ from tbcad.cad.drafting.callouts import EDGE, PIXELS, balloons
 from tbcad.cad.drafting.line_pictures import LinePicture, axes_toward, line_picture
 from tbcad.cad.drafting.sheet import Box
 from tbcad.cad.formats.entities import Entity, Layer, Line, Point, Polyline
+from tbcad.common.reuse import kept
 from tbcad.prototype.assembly_steps.exploded import offsets
 from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.prototype.assembly_steps.steps import Step
@@ -187,6 +188,7 @@ def _other_end(line: Line, end: Point) -> Point:
     return line.end if line.start == end else line.start
 
 
+@kept("pictures")
 def _best_eye(bodies: Bodies, groups: list[list[str]]) -> Floats:
     """The direction from which most kinds of new parts are seen."""
     names = sorted(bodies)

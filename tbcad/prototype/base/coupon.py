@@ -15,6 +15,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from tbcad.cad.kernel.checks import check_pads, closed_mesh, properties
 from tbcad.cad.kernel.glyphs import ROWS, relief, text_width
 from tbcad.cad.kernel.solids import fused, moved, one_solid, polygon, prism
+from tbcad.common.reuse import kept
 from tbcad.core.geometry.primitives import rectangle
 from tbcad.core.spec.design import PrinterSpec
 from tbcad.core.spec.errors import SpecError
@@ -51,6 +52,7 @@ Place = tuple[CouponRow, Floats]
 """A row, and its left end on its shelf's middle line, mm, (2,)."""
 
 
+@kept("coupons")
 def coupon_plates(
     base: BaseLayout, printer: PrinterSpec, pose: SeatPose, mesh_mm: float
 ) -> list[PlacedSolid]:

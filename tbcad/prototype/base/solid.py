@@ -30,6 +30,7 @@ from tbcad.cad.kernel.solids import (
     prism,
     revolved_polygon,
 )
+from tbcad.common.reuse import kept
 from tbcad.core.geometry.rotations import unit_circle
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.spec.design import PrinterSpec
@@ -173,6 +174,7 @@ def facet_count(radius: float, angle: float) -> int:
     return int(np.ceil(angle / (2 * np.arccos(radius / (radius + FACETS_OUT_MM)))))
 
 
+@kept("carrier")
 def carrier_parts(
     base: BaseLayout, split: BaseSplit, printer: PrinterSpec, mesh_mm: float
 ) -> list[PlacedSolid]:
@@ -209,6 +211,7 @@ def carrier_solid(
     raise errors[0]
 
 
+@kept("carrier")
 def carrier_mesh(base: BaseLayout, split: BaseSplit = UNCUT) -> Mesh:
     """The carrier in the frame of the shell by booleans of meshes, before its solid is built."""
     seats = base.local_seats

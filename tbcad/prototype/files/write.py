@@ -20,12 +20,15 @@ from tbcad.cad.formats.glb import Colour, write_glb
 from tbcad.cad.formats.mesh_files import write_3mf, write_stl
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
-from tbcad.cad.kernel.solids import pyramid, sphere
+from tbcad.cad.kernel.mesh import Mesh
+from tbcad.cad.kernel.solids import from_bytes, pyramid, sphere, to_bytes
+from tbcad.common.reuse import kept
 from tbcad.common.schedule import Submit
 from tbcad.core.camera.sheet import write_camera_sheet
+from tbcad.core.geometry.primitives import Component
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import MirrorDesign
-from tbcad.core.spec.design import Spec
+from tbcad.core.spec.design import Spec, without_sections
 from tbcad.prototype.arrangement import PrototypeModel, arrangements
 from tbcad.prototype.assembly_steps.book import write_book
 from tbcad.prototype.assembly_steps.machine import AssembledMachine
@@ -81,7 +84,8 @@ def export_prototype(
     built = build_prototype_model(arrangements(design), progress, submit)
     spec = built.spec
     progress("prototype: files")
-    prints = [submit(write_part, folder, part, spec) for part in built.printed]
+    own = without_sections(spec, "optics", "camera", "mirrors", "shell", "prototype")
+    prints = [submit(write_part, folder, part, own) for part in built.printed]
     if shroud := built.shroud:
         for panel in shroud.panels:
             submit(write_dxf, folder / f"{panel.name}.dxf", pattern(panel, shroud.sheet))
@@ -114,6 +118,7 @@ def export_prototype(
     return spec
 
 
+@kept("files of printed parts")
 def write_part(folder: Path, part: PrintedPart, spec: Spec) -> tuple[float, float]:
     """STEP as assembled, STL and 3MF on the printer's bed; an estimate of its print."""
     mesh, solid = part_mesh(part), Solid(part.name, part.solid.shape, ())
@@ -177,13 +182,10 @@ def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
         for k in (~layout.balls.cap).nonzero()[0].tolist()
     )
     card = (  # without flaps; transparent, so that the rig is seen
-        ColouredSolid(panel.name, component_solid(panel.component), CARD)
+        _body(panel.component, panel.name, CARD)
         for panel in (prototype.shroud.panels if prototype.shroud else ())
     )
-    purchased = (
-        ColouredSolid(component.name, component_solid(component), METAL)
-        for component in prototype.frame.purchased
-    )
+    purchased = (_body(component, component.name, METAL) for component in prototype.frame.purchased)
     return (
         _printed("base", prototype, ("base", "cap")),
         SolidGroup("balls", tuple(balls)),
@@ -194,6 +196,17 @@ def assembly_groups(prototype: PrototypeModel) -> tuple[SolidGroup, ...]:
         SolidGroup("fasteners", tuple(_fasteners(prototype.fasteners))),
         _views(prototype),
     )
+
+
+def _body(component: Component, name: str, colour: Colour) -> ColouredSolid:
+    data, mesh = _solid_and_mesh(component)
+    return ColouredSolid(name, from_bytes(data), colour, mesh)
+
+
+@kept("bodies of the assembly")
+def _solid_and_mesh(component: Component) -> tuple[bytes, Mesh]:
+    solid = component_solid(component)
+    return to_bytes(solid), display_mesh(solid)
 
 
 def _printed(name: str, prototype: PrototypeModel, roles: tuple[Role, ...]) -> SolidGroup:
@@ -212,8 +225,7 @@ def _fasteners(fasteners: Sequence[Fastener]) -> Iterator[ColouredSolid]:
         name = one.part.name
         if name not in originals:
             at_origin = replace(one, place=np.zeros(3), along=np.eye(3)[0])
-            solid = component_solid(fastener_component(at_origin))
-            originals[name] = ColouredSolid(name, solid, FASTENER, display_mesh(solid))
+            originals[name] = _body(fastener_component(at_origin), name, FASTENER)
         yield originals[name].copy(one.name, fastener_axes(one.along), one.place)
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from trimesh import Trimesh
 
+from tbcad.common.reuse import kept
 from tbcad.core.geometry.vectors import norm
 from tbcad.prototype.drive.balance import GRAVITY
 from tbcad.prototype.gravity.elastic import Cells, fill_cells, hold
@@ -41,6 +42,7 @@ class Axle:
     radius: float  # mm
 
 
+@kept("weight")
 def sag_of_bodies(part: Trimesh, bodies: Bodies, axle: Axle, material: Material) -> Floats:
     """Displacements of bodies' centres under one g along each axis, mm, (k, 3, 3).
 
@@ -57,6 +59,7 @@ def sag_of_bodies(part: Trimesh, bodies: Bodies, axle: Axle, material: Material)
     return np.stack([np.einsum("anb,nbg->ag", fit[:3], moved[nodes]) for nodes, fit in seats])
 
 
+@kept("weight")
 def compliance(
     part: Trimesh, at: Floats, held: list[Axle], loaded: list[Axle], material: Material
 ) -> Floats:

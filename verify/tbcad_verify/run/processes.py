@@ -18,10 +18,13 @@ import threading
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import copy_context
+from dataclasses import replace
 from queue import SimpleQueue
 from typing import IO, Any
 
 from tbcad_verify.run.child import crash_reason
+from tbcad_verify.run.kept import STORE, keeping
 
 HEARD, DONE, FAILED = "heard", "done", "failed"  # kinds of answers
 LENGTH = struct.Struct("<Q")  # goes before each message, bytes
@@ -66,7 +69,8 @@ class Processes(ThreadPoolExecutor):
     ) -> Future[Any]:
         """As `call`, in another thread; the future has what that returns or raises."""
         try:
-            return super().submit(self.call, work, *arguments, heard=heard)
+            context = copy_context()  # with the store of what is kept
+            return super().submit(context.run, self.call, work, *arguments, heard=heard)
         except RuntimeError:
             if self._shutdown:
                 raise
@@ -91,15 +95,21 @@ class Processes(ThreadPoolExecutor):
             process = self._idle.pop() if self._idle else self._started()
         except OSError:
             return _here(work, arguments, heard)
+        store = STORE.get()
+        own = replace(store, reused=set()) if store else None
         try:
-            kind, value = process.ask((work, arguments, heard is not None), heard, self.seconds)
+            request = work, arguments, heard is not None, own
+            kind, value = process.ask(request, heard, self.seconds)
         except BaseException:
             process.kill()
             raise
         self._idle.append(process)
         if kind == FAILED:
             raise value
-        return value
+        result, reused = value
+        if store:
+            store.reused.update(reused)
+        return result
 
     def _started(self) -> _Process:
         process = _Process()
@@ -243,8 +253,10 @@ def _answer_to(message: bytes, answers: IO[bytes]) -> bytes:
         _write(answers, pickle.dumps((HEARD, value)))
 
     try:
-        work, arguments, reports = pickle.loads(message)
-        return pickle.dumps((DONE, work(*arguments, *([report] if reports else []))))
+        work, arguments, reports, store = pickle.loads(message)
+        with keeping(store):
+            result = work(*arguments, *([report] if reports else []))
+        return pickle.dumps((DONE, (result, store.reused if store else ())))
     except Exception as error:
         error.add_note(traceback.format_exc())
         try:

@@ -5,7 +5,9 @@ Each is independent of the others: the checks of one that breaks are unknown, ne
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
@@ -30,6 +32,7 @@ from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require, unknown
+from tbcad_verify.run.kept import kept
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import MirrorChecks, Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
@@ -51,6 +54,7 @@ SHELL_STAGES = (
     "coverage",
     "every pixel",
 )
+NO_FOLDER = Path(os.devnull)  # nothing can be read from it
 MANDRELS, LAMPS = "mandrels", "lamps"
 READING, THREEMF, RECORD, MESHES, PRINTABILITY, SETUP, COVERAGE, PIXELS = SHELL_STAGES
 
@@ -101,7 +105,7 @@ def run_stages(
     if beside and export.prototype:
         ending = beside.submit(*work, heard=prototype.put)
         ending.add_done_callback(lambda _: prototype.put(None))
-    _verify_shells(export, facets, profiles, bool(printers), cutter_mm, sink)
+    _verify_shells(_of_shells(export), facets, profiles, bool(printers), cutter_mm, sink)
     if beside and export.prototype:
         for results in iter(prototype.get, None):
             sink(results)
@@ -118,6 +122,17 @@ def run_in_two(
         run_stages(folder, printers, cutter_mm, sink, beside)
 
 
+def _of_shells(export: Export) -> Export:
+    """The record without what no check of the shells may read: such a check would be unknown."""
+    spec = export.spec.model_copy(update={"prototype": None})
+    return replace(export, spec=spec, folder=NO_FOLDER, manifest={}, digests={}, prototype=None)
+
+
+def _all_known(found: Results | None) -> bool:
+    return found is None or all(check.passed is not None for check in found.checks)
+
+
+@kept("checks of shells", heard=True, sure=_all_known)
 def _verify_shells(
     export: Export,
     facets: list[Facets],
@@ -222,7 +237,7 @@ def _verify_prototype(
     measured = verify_prototype(export, export.prototype, facets, sink)
     sink(Results(stages=[PRINTING]))
     for printed in measured:
-        measures, lost = attempt(partial(_measures, printed))
+        measures, lost = attempt(partial(_measures_alone, printed))
         _assess_printing(printed.part.stl, measures, lost, profiles, required, sink)
         own = partial(own_print_checks, printed.part, export.spec.printer, measures, lost)
         sink(Results(checks=guarded([own_print_name(printed.part)], own)))
@@ -231,10 +246,16 @@ def _verify_prototype(
 def _compare_3mf(
     export: Export, part: PartFiles, facets: Facets, sink: ResultSink
 ) -> tuple[int, str]:
-    corners, blob = read_3mf(export.folder, part.threemf)
-    name = ("3MF", part.threemf, "mm")
-    sink(Results(checks=guarded([name], lambda: [same_check(name, corners, facets)])))
-    return blob.digest
+    check, digest = _compared_3mf(export.folder / part.threemf, facets)
+    sink(Results(checks=[check]))
+    return digest
+
+
+@kept("checks of 3MF files", sure=lambda found: found[0].passed is not None)
+def _compared_3mf(file: Path, facets: Facets) -> tuple[Check, tuple[int, str]]:
+    corners, blob = read_3mf(file.parent, file.name)
+    name = ("3MF", file.name, "mm")
+    return guarded([name], lambda: [same_check(name, corners, facets)])[0], blob.digest
 
 
 def _measure_shells(export: Export, stls: list[Facets], sink: ResultSink) -> list[ShellPart]:
@@ -254,6 +275,11 @@ def _measures(part: ShellPart | MeasuredPart, scene: RayScene | None = None) -> 
         part.edges,
         scene,
     )
+
+
+@kept("checks of printed parts")
+def _measures_alone(part: MeasuredPart) -> PartMeasures:
+    return _measures(part)
 
 
 def _assess_printing(

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import copy_context
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -144,7 +145,7 @@ def _unknown_stages(titles: Sequence[str], begun: Sequence[str], reason: str) ->
 def _steps(export: Export, seconds: float) -> Iterator[Callable[[], Steps]]:
     """Read STEP files while the block runs; the value waits for them."""
     with ThreadPoolExecutor(1) as pool, Processes(PROCESSES, seconds) as processes:
-        yield pool.submit(_read_steps, export, processes).result
+        yield pool.submit(copy_context().run, _read_steps, export, processes).result
 
 
 def _read_steps(export: Export, processes: Processes) -> Steps:

@@ -19,6 +19,7 @@ from tbcad_verify.mesh.mesh import MassProperties
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import AGAIN, HEAD, FileBytes, read
 from tbcad_verify.report.checks import Unknown
+from tbcad_verify.run.kept import kept
 from tbcad_verify.run.processes import ProcessEnded, Processes
 from tbcad_verify.step.grammar import refuse_foreign
 from tbcad_verify.step.part21 import StepTable
@@ -129,6 +130,7 @@ def _answer(asked: Future[StepFile]) -> StepFile | Unknown:
         return Unknown(f"{type(error).__name__}: {error}")
 
 
+@kept("checks of STEP files")
 def read_file(file: Path) -> StepFile:
     """One file: its names and claims by its text, its measures by the kernel, faces by both; mm.
 
