@@ -11,8 +11,6 @@ from tbcad.core.optics.camera import Camera
 from tbcad.light.simulate.camera_photographs import photographed
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.capture.photograph import Samples, subpixel_shifts, to_bytes
-from tbcad.light.simulate.capture.real import RealOptics
-from tbcad.light.simulate.real_camera import real_optics
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.rays import Shift
@@ -32,13 +30,11 @@ from tbcad.light.simulate.views.viewpoints import (
     pinhole_targets,
 )
 from tbcad.options.captures import Geometry
-from tbcad.prototype.balls.catalogue import roughnesses_nm
-from tbcad.records.camera_sheet import NAME
 from tbcad.studies.paper import claimed, notes
 from tbcad.types import Bytes, Progress
 
 WHERE = "section 5.3, Fig. 11"
-NO_FILTER, REAL = "none", "real optics"
+NO_FILTER = "none"
 SHELL, PROTOTYPE = "shell", "prototype"
 ELEVATIONS_DEG = (15.0, 45.0)
 LENS_SIZE = (320, 240)  # pixels of the pictures with the large aperture
@@ -51,9 +47,9 @@ class Blur:
     """What blurs the photographs of one case."""
 
     geometry: str  # of the mirrors
-    name: str  # none, filter, lens or real optics
-    px: float  # separation or diameter, pixels; 0 without and of real optics
-    samples: Samples | RealOptics  # rays of a pixel, or what the camera is
+    name: str  # none, filter or lens
+    px: float  # separation or diameter, pixels
+    samples: Samples  # rays of a pixel
 
 
 @dataclass(frozen=True)
@@ -65,24 +61,15 @@ class BlurOptions:
     # a pixel, in each of the filter's images, is the mean of samples x samples rays
     samples: int = 2
 
-    def cases(self, export: ExportedDesign) -> list[Blur]:
-        """Shell and prototype without blur, the prototype with each, both with real optics."""
+    def cases(self) -> list[Blur]:
+        """Shell and prototype without blur, and the prototype with each."""
         n, rays = self.samples, LENS_RAYS * self.samples**2
         return [
             Blur(SHELL, NO_FILTER, 0.0, n),
             Blur(PROTOTYPE, NO_FILTER, 0.0, n),
             *(Blur(PROTOTYPE, "filter", px, low_pass_shifts(px, n)) for px in self.separations_px),
             *(Blur(PROTOTYPE, "lens", px, defocus_shifts(px, rays)) for px in self.lens_px),
-            *real_cases(export),
         ]
-
-
-def real_cases(export: ExportedDesign) -> list[Blur]:
-    """Shell and prototype before the lens of camera.json; none where a build is without it."""
-    if not (export.folder / NAME).is_file():
-        return []
-    roughness = {SHELL: None, PROTOTYPE: roughnesses_nm(export.folder)}
-    return [Blur(name, REAL, 0.0, real_optics(export, of)[0]) for name, of in roughness.items()]
 
 
 def low_pass(
@@ -102,7 +89,7 @@ def low_pass(
     pinholes = pinhole_targets(scene, viewpoints.cameras(export.capture_mm), progress)
     records: list[Record] = []
     sharpest: dict[str, float] = {}
-    for case in options.cases(export):
+    for case in options.cases():
         geometry: Geometry = "prototype" if case.geometry == PROTOTYPE else "spheres"
         light_field = photographed(export, scene, geometry, case.samples, progress)
         contrast = _contrast(light_field)
@@ -158,8 +145,7 @@ def _means(table: Table) -> list[Record]:
 
 
 def _name(record: Record) -> str:
-    named = {NO_FILTER: "no blur", REAL: REAL}
-    blur = named.get(str(record["blur"]), f"{record['blur']} {record['px']:g} px")
+    blur = "no blur" if record["blur"] == NO_FILTER else f"{record['blur']} {record['px']:g} px"
     return f"{record['geometry']}, {blur}"
 
 
