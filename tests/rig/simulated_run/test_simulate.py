@@ -137,19 +137,6 @@ def test_real_optics_are_in_the_record(
     assert "real" not in simulate._record((ideal,), phases, export).document()
 
 
-@pytest.mark.parametrize(
-    ("options", "reason"),
-    [
-        ({"gloss": 0.3}, "--gloss is of --optics real"),
-        ({"gloss": 0.3, "optics": "real", "phases": "dark,led_1"}, "in phase lit alone"),
-        ({"bits": 12}, "--bits 12 is not written"),
-    ],
-)
-def test_options_that_exclude_each_other(options: dict[str, Any], reason: str) -> None:
-    with pytest.raises(InputError, match=reason):
-        SimulateRunOptions("exports", **options).check()
-
-
 def test_exposures_and_brightness(export_with_wind_up: Path, tmp_path: Path) -> None:
     """A dark photograph for each exposure; sidecars say it; a bright LED takes a short one."""
     usual = {"stops": "30", "phases": "dark,led_1,lit"}
