@@ -171,7 +171,7 @@ class SimulateRunOptions(Call):
         if self.gloss is not None and self.optics == "ideal":
             raise InputError("--gloss is of --optics real: add that, or leave it out")
         if self.gloss is not None and "lit" not in (self.phase_names() or ("lit",)):
-            raise InputError("--gloss is seen in phase lit alone: add it to --phases, or leave it")
+            raise InputError("--gloss is seen in phase lit alone: add lit, or leave out --gloss")
         self.stop_numbers()
         exposures(self.exposure_leds, self.exposure_lit)
 

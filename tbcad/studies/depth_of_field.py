@@ -160,7 +160,8 @@ def _pupil_records(
             seen = count_pixels(images.array, sensor, capture / 2).seen
             real = ResolvedSpots(images, seen, pixel_pitch(images.array.camera, sensor))
             ideal, spots = (2 * float(each.sum()) / cameras for each in (seen, real.spots))
-            widths = spot_mm(capture, ideal), spot_mm(capture, spots)
+            # Flat mirrors see a part of the sphere only: their pixels do not share its disc.
+            widths = [None if rule == "flat" else spot_mm(capture, n) for n in (ideal, spots)]
             figures = (rule, *astuple(sensor), real.best_pupil, ideal, spots, *widths)
             records.append(dict(zip(PUPILS, figures, strict=True)))
     return records

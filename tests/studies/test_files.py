@@ -37,7 +37,7 @@ from tbcad.output.single_files import check_tables
 from tbcad.studies.depth_of_field import LensOptions, depth_of_field
 from tbcad.studies.elevation import capture_area, elevation
 from tbcad.studies.paper import is_table_i, with_lens_of_table_i
-from tbcad.studies.resolution import COUNTED, Ratio, balance, parse_ratio, resolution
+from tbcad.studies.resolution import COUNTED, KINDS, Ratio, balance, parse_ratio, resolution
 from tbcad.studies.ssim import ssim
 from tests.mirror_arrays import mirror_array, mirror_design
 
@@ -64,14 +64,16 @@ def test_resolution_finds_what_its_rows_say(small: Study) -> None:
         assert at["virtual_cameras"] == 5 * at["n"] ** 2 + 2 * at["n"] + 1
         assert at["seeing_average_px"] == at["seeing_px"] / at["virtual_cameras"]
         assert at["seeing_px"] < at["on_mirrors_px"] < 2 * at["width_px"] * at["height_px"]
+        assert 0 < at["resolved_average_spots"] < at["seeing_average_px"]
+        assert at["ideal_spot_mm"] < at["real_spot_mm"]
     for at in balanced.records():
         if at["balanced_n"] is None:
             assert "--from" in at["reason"]
             continue
         aim = {"1:1": 1, "1:4": 0.25}[at["ratio"]]
         found = swept.where(width_px=at["width_px"])
-        column = {"seeing": "seeing_average_px", "on mirrors": "on_mirrors_average_px"}
-        actual = found.numbers("virtual_cameras") / found.numbers(column[at["pixels_counted"]])
+        column = KINDS[str(at["pixels_counted"])]
+        actual = found.numbers("virtual_cameras") / found.numbers(column)
         above, below = (found.numbers("n")[side] for side in (actual > aim, actual < aim))
         assert max(below) < at["balanced_n"] < min(above)
     assert np.isfinite(balanced.numbers("balanced_n")).any()
@@ -111,7 +113,7 @@ def test_a_refused_design_is_a_row_with_its_reason(monkeypatch: pytest.MonkeyPat
     assert "no radius gives" in str(at["traced_reason"])
     study = resolution(spec, range(9, 10), (Sensor(208, 155),), (Ratio(1, 1),))
     (at,) = study.tables[0].records()
-    assert [at[name] for name in COUNTED] == [None] * 7
+    assert [at[name] for name in COUNTED] == [None] * len(COUNTED)
     assert "no radius gives" in str(at["reason"])
     assert len(study_files(study)) == 5
     found = ssim(spec, built_in_object(36.0), (Sensor(208, 155),), around, BY_NEAREST, print)

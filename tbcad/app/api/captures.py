@@ -104,9 +104,11 @@ def photograph(options: CaptureOptions) -> Photographs:
 
 def _roughness_nm(export: ExportedDesign, options: CaptureOptions) -> list[float] | None:
     """Of each ball of a prototype; None of a shell's mirrors."""
-    from tbcad.prototype.balls.catalogue import roughnesses_nm
+    if options.geometry != "prototype":
+        return None
+    from tbcad.prototype.balls.catalogue import recorded_roughness_nm
 
-    return roughnesses_nm(export.folder) if options.geometry == "prototype" else None
+    return recorded_roughness_nm(export.folder)
 
 
 def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict[str, Any]:

@@ -130,11 +130,11 @@ def roughness_rq_nm(grade: str | None) -> float:
     return 1000 * RQ_OVER_RA * load_grades()[grade].roughness_ra_um
 
 
-def roughnesses_nm(folder: Path) -> list[float]:
-    """RMS roughness of each ball of a build, nm."""
+def recorded_roughness_nm(exports: Path) -> list[float]:
+    """RMS roughness of each ball of a build, nm; InputError: its table of balls is broken."""
     from tbcad.records.tables import BallRow
 
-    return [roughness_rq_nm(ball.grade) for ball in BallRow.read(folder)]
+    return [roughness_rq_nm(ball.grade) for ball in BallRow.read(exports)]
 
 
 def load_catalogue(names: Iterable[str]) -> Catalogue:

@@ -114,7 +114,7 @@ class SimulatedRun:
         light: dict[str, Signal | None] = {DARK: None, DARK_LIT: None}
         real = self._real(number)
         if LIT in phases:
-            light[LIT] = self._object(number, real)
+            light[LIT] = self._object(number) if real is None else self._real_object(real)
         if set(phases) - {LIT, *light}:
             light.update(self._leds(number, real))
         return {phase: self._recorded(frame, phase, light[phase]) for phase in phases}
@@ -133,16 +133,18 @@ class SimulatedRun:
             return None
         return RealFrame(self.built, number, turned, self.directions, optics)
 
-    def _object(self, number: int, real: RealFrame | None) -> Signal:
+    def _real_object(self, real: RealFrame) -> Signal:
         brightness = self.chain.object_light * self.chain.exposure(LIT)
-        if real is not None:
-            return real.object_light(self.scene) * np.float32(brightness / WHITE)
+        return real.object_light(self.scene) * np.float32(brightness / WHITE)
+
+    def _object(self, number: int) -> Signal:
         pinhole = self.built.machine.camera.pinhole
         balls, turned = balls_of_frame(self.built, number), self._turned(number)
         walls = self.built.walls
         colour = object_light(
             pinhole, self.directions, balls, self.scene, turned, walls, self.blocks
         )
+        brightness = self.chain.object_light * self.chain.exposure(LIT)
         share = colour.astype(np.float32) * np.float32(brightness / WHITE)
         return blurred(share, self.chain.spread)
 

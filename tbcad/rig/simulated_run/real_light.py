@@ -77,14 +77,14 @@ class RealFrame:
         near = maximum_filter(shown.reshape(self.directions.shape[:2]), REACH)
         light = np.zeros(self.directions.shape, dtype=np.float32)
         light[near] = ball_light(self.view, scene, self.optics, np.flatnonzero(near))
-        return self._veiled(light, self.optics.kernel(self.view.pitch))
+        return self._veiled(light, self.optics.kernel(self.view.pinhole_camera))
 
     def led_images(
         self, occluders: Occluders, dome: float, brightness: Floats, faint: float
     ) -> list[Signal]:
         """Images (h, w) of LEDs with domes (mm) that fill pixels so far, (l,)."""
         points = self.led_points(occluders, dome, faint)
-        kernel = pixel_kernel(self.optics.lens.cutoff(self.view.pitch), PLACES)
+        kernel = pixel_kernel(self.optics.lens.cutoff(self.view.pinhole_camera.pixel_pitch), PLACES)
         factors, images = kernel_factors(kernel), []
         factors[:, :-1] *= PLACES
         for led, bright in enumerate(brightness.tolist()):

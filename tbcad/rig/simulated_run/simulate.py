@@ -31,7 +31,7 @@ from tbcad.options.machines import SimulateRunOptions
 from tbcad.options.shared import exposures
 from tbcad.output.folder import check_replaceable, replacing
 from tbcad.output.single_files import Source, refuse_inputs
-from tbcad.prototype.balls.catalogue import roughnesses_nm
+from tbcad.prototype.balls.catalogue import recorded_roughness_nm
 from tbcad.records.camera_sheet import RealOpticsRecord
 from tbcad.records.run import (
     PHOTOGRAPHS,
@@ -130,7 +130,9 @@ def _real(
     """Lens and mirrors, and what the run's record says of them; None with ideal optics."""
     if options.optics == "ideal":
         return None, None
-    optics, told = real_optics(export, None if options.shell else roughnesses_nm(export.folder))
+    optics, told = real_optics(
+        export, None if options.shell else recorded_roughness_nm(export.folder)
+    )
     own = {"gloss": options.gloss, "bits": options.bits, "left_out": LEFT_OUT_OF_RUNS}
     return optics, told.model_copy(update=own)
 

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tbcad.core.camera.sheet import write_camera_sheet
+from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import read_export
@@ -110,6 +112,29 @@ def test_options_choose_stops_and_phases(export_with_wind_up: Path) -> None:
     assert phases == ("dark", "led_2")
     assert [(f.object_turn_deg, f.stop) for f in run.frames] == [(0, 2), (0, 3), (180, 2), (180, 3)]
     assert not run.built.machine.camera.distortion.any()
+
+
+def test_real_optics_are_in_the_record(
+    export_with_wind_up: Path, low_resolution_design: MirrorDesign, tmp_path: Path
+) -> None:
+    """By the lens of camera.json; nothing of it is in the record of any other run."""
+    options = {"stops": "30", "optics": "real", "gloss": 0.3, "bits": 16, "phases": "dark,lit"}
+    with pytest.raises(InputError, match=r"camera\.json is not there: build it again"):
+        prepared(export_with_wind_up, **options)
+    export = Path(shutil.copytree(export_with_wind_up, tmp_path / "export"))
+    write_camera_sheet(export, low_resolution_design.arrays[0], 30.0)
+    (run,), phases = prepared(export, **options)
+    assert run.scene.microfacets is not None
+    simulate.write_run((run,), phases, export, tmp_path / "run", lambda _: None)
+    found = read_run(tmp_path / "run")
+    lit = read_photograph(found, found.exposures["a_0030_lit"])
+    assert lit.max() > 1000
+    told = found.record.real
+    assert told is not None
+    assert (told.gloss, told.bits, told.rays_a_pixel) == (0.3, 16, 4)
+    assert not any("dust" in one for one in told.left_out)
+    (ideal,), phases = prepared(export, stops="30", phases="dark")
+    assert "real" not in simulate._record((ideal,), phases, export).document()
 
 
 def test_exposures_and_brightness(export_with_wind_up: Path, tmp_path: Path) -> None:

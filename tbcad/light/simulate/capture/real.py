@@ -64,9 +64,10 @@ class RealOptics:
     seed: int = 0  # of the noise
     filter_px: float = 0.0  # separation of the four images of a low-pass filter; 0: none
 
-    def kernel(self, pitch: float) -> Floats:
-        """Shares of fine samples in a pixel so wide at unit distance, as of `pixel_kernel`."""
-        return pixel_kernel(self.lens.cutoff(pitch), self.fine, filter_px=self.filter_px)
+    def kernel(self, camera: Camera) -> Floats:
+        """Shares of fine samples in a pixel of a camera, as of `pixel_kernel`."""
+        cutoff = self.lens.cutoff(camera.pixel_pitch)
+        return pixel_kernel(cutoff, self.fine, filter_px=self.filter_px)
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def real_photograph(
     )
     told = in_batches(work, bands, lambda rows: progress(f"row {rows.start} of {camera.height_px}"))
     rays, light = zip(*told, strict=True)
-    whole = with_halo(np.concatenate(light), optics.kernel(camera.pixel_pitch))
+    whole = with_halo(np.concatenate(light), optics.kernel(camera))
     mirror = np.concatenate([number for number, *_ in rays])
     whole = with_scatter(whole, mirror, mirror_scatter(reflector, optics)[mirror])
     fall = vignetting(without_distortion(camera), unit_directions(camera, range(camera.height_px)))
@@ -155,7 +156,7 @@ def _band(
         one.own(samples, n)[:] = _seen(
             camera, one, trace(wide, one.shift), scene, (optics.reflectance, wide)
         )
-    light = pixels_of_samples(samples, kernel_factors(optics.kernel(camera.pixel_pitch)), n)
+    light = pixels_of_samples(samples, kernel_factors(optics.kernel(camera)), n)
     places = rays.origin.astype(np.float32), rays.direction.astype(np.float32)
     return (rays.mirror, *places), light
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 from tbcad.core.geometry.vectors import norm, unit
-from tbcad.core.optics.camera import LensCamera, vignetting
+from tbcad.core.optics.camera import Camera, LensCamera, vignetting
 from tbcad.core.optics.lens import KERNEL_PX, kernel_factors, pixels_of_samples
 from tbcad.core.optics.pedestals.cells import NO_WALLS, GrooveWalls
 from tbcad.core.optics.reflection import scattered_shares
@@ -43,9 +43,12 @@ class BallView:
     walls: GrooveWalls = NO_WALLS
 
     @property
-    def pitch(self) -> float:
-        """Width of a pixel at unit distance."""
-        return float(1 / self.camera.focal.mean())
+    def pinhole_camera(self) -> Camera:
+        """The camera without distortion, its axis in the middle."""
+        one = self.camera
+        hfov = 2 * np.arctan(one.width_px / one.focal.mean() / 2)
+        ahead, right = one.axes[2], one.axes[0]
+        return Camera(one.pinhole, ahead, right, one.width_px, one.height_px, float(hfov))
 
     def centres(self, pixels: Ints) -> Floats:
         """Columns and rows (n, 2) of pixels (n,), counted row by row."""
@@ -68,7 +71,7 @@ def real_pixels(
     """
     camera = run.camera
     view = BallView(camera, run.balls[stop], camera.directions)
-    kept = optics.kernel(view.pitch).sum()
+    kept = optics.kernel(view.pinhole_camera).sum()
     light = ball_light(view, scene, optics, pixels) / np.float32(kept)
     direction = camera.directions(view.centres(pixels))
     hits = view.hits(camera.pinhole, direction)
@@ -90,7 +93,7 @@ def ball_light(view: BallView, scene: Scene, optics: RealOptics, pixels: Ints) -
     camera = view.camera
     asked = np.zeros((camera.height_px + 2 * KERNEL_PX, camera.width_px), dtype=bool)
     asked[KERNEL_PX : KERNEL_PX + camera.height_px].flat[pixels] = True
-    factors = kernel_factors(optics.kernel(view.pitch))
+    factors = kernel_factors(optics.kernel(view.pinhole_camera))
     found = np.zeros((len(pixels), 3), dtype=np.float32)
     for rows in row_bands(camera.height_px):
         first, last = np.searchsorted(pixels, camera.width_px * np.array([rows.start, rows.stop]))
