@@ -53,7 +53,7 @@ class Figure:
     name: str
     unit: str
     limit: float | None  # of the mirror that passes it first, or of a shell; None: any
-    statistics: float | None  # two standard deviations with which the yield is the wanted one, or any
+    statistics: float | None  # two standard deviations that give the wanted yield, or any
     chain: float  # two standard deviations of the chain, of that mirror; a fillet as it is
     verdict: str
 

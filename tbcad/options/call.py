@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
@@ -39,6 +40,7 @@ Record = TypeVar("Record")
 Asked_contra = TypeVar("Asked_contra", contravariant=True)
 Result_co = TypeVar("Result_co", covariant=True)
 Result = TypeVar("Result")
+OPTION = re.compile(r"--[a-z][a-z-]*[a-z]")
 
 
 def silent(_: str) -> None:
@@ -87,13 +89,35 @@ def keywords(
         def called(*args: Any, **kwargs: Any) -> Result:
             if len(args) == 1 and not kwargs and isinstance(args[0], kind):
                 return function(cast("Record", args[0]))
-            return function(record(*args, **kwargs))
+            try:
+                return function(record(*args, **kwargs))
+            except InputError as error:
+                error.args = (_in_python(str(error), kind),)
+                raise
 
         vars(called)["__signature__"] = _signature(kind, signature(function).return_annotation)
         called.__doc__ = _with_arguments(function.__doc__ or "", kind)
         return cast("Function[Keywords, Record, Result]", called)
 
     return decorated
+
+
+def _in_python(text: str, record: type[Call]) -> str:
+    """A line for the screen with keywords of Python in place of the record's options."""
+    words = dict(_python_words(record))
+    return OPTION.sub(lambda found: words.get(found[0], found[0]), text)
+
+
+def _python_words(record: type[Call]) -> Iterator[tuple[str, str]]:
+    """Options of a record as they are written, and how Python has them: size, force=True."""
+    for name, kind in _annotated(record).items():
+        of, option = get_args(kind)[:2]
+        # Of an annotation, typer takes its first way of writing for a default.
+        given = (getattr(option, "default", None), *(getattr(option, "param_decls", None) or ()))
+        ways = "/".join(one for one in given if isinstance(one, str)).split("/")
+        plain = name.replace("_", "-")
+        for way in (f"--{plain}", f"--no-{plain}", *ways):
+            yield way, f"{name}={not way.startswith('--no-')}" if of is bool else name
 
 
 def _annotated(record: type) -> dict[str, Any]:
