@@ -122,7 +122,7 @@ def test_refusals_in_python_name_its_keywords(tmp_path: Path) -> None:
         (lambda: tbcad.build(n=3, process=" "), "process is ' ', allowed is one of fdm"),
         (
             lambda: tbcad.dataset(tmp_path, to="colmap", exports="x"),
-            "exports x is for --to mitsuba",
+            "exports x is for to mitsuba",
         ),
     ):
         with pytest.raises(InputError) as error:
@@ -131,5 +131,5 @@ def test_refusals_in_python_name_its_keywords(tmp_path: Path) -> None:
 
 
 def test_a_record_is_refused_by_the_options_of_the_command() -> None:
-    with pytest.raises(InputError, match="^--yield .* without --process"):
+    with pytest.raises(InputError, match=r"^--yield .* without --process"):
         tbcad.build(BuildOptions(n=3, wanted_yield=0.9))
