@@ -9,7 +9,6 @@ from importlib.resources import files
 from pathlib import Path
 
 from tbcad.common.atomic_files import replace_files, write_errors_as_input_errors
-from tbcad.errors import InputError
 from tbcad.output.single_files import check_file
 from tbcad.prototype.assembly_steps.instructions import Instructions, hours_text
 from tbcad.prototype.assembly_steps.steps import Step
@@ -30,11 +29,8 @@ def write_page(
 ) -> Path:
     """Write the steps of an assembly as a page, with or without pictures; other files stay.
 
-    InputError: out is named like a page, the page exists, a file cannot be read or written, or
-    drawing fails.
+    InputError: the page exists, a file cannot be read or written, or drawing fails.
     """
-    if out.suffix.lower() in (".html", ".htm"):
-        raise InputError(f"{out}: allowed is a folder, which gets {NAME}: name one with --out")
     check_file(out / NAME, force)
     drawn = _drawn(folder) if pictures else {}
     text = page(told, drawn)
