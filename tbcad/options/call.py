@@ -2,8 +2,8 @@
 
 import ast
 import inspect
-import re
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, replace
@@ -34,13 +34,18 @@ from typer.models import ParameterInfo
 from tbcad.common.progress import Progress
 from tbcad.common.screen import Stages
 from tbcad.errors import InputError
+from tbcad.options.python_help import LinesSignature, in_python
 
 Keywords = ParamSpec("Keywords")
 Record = TypeVar("Record")
 Asked_contra = TypeVar("Asked_contra", contravariant=True)
 Result_co = TypeVar("Result_co", covariant=True)
 Result = TypeVar("Result")
-OPTION = re.compile(r"--[a-z][a-z-]*[a-z]")
+HELP_COLUMNS = 92  # of the arguments in a docstring; help() moves them by four
+INDENTS: dict[str, Any] = {
+    **{"initial_indent": 8 * " ", "subsequent_indent": 12 * " "},
+    **{"break_long_words": False, "break_on_hyphens": False},
+}
 
 
 def silent(_: str) -> None:
@@ -92,7 +97,7 @@ def keywords(
             try:
                 return function(record(*args, **kwargs))
             except InputError as error:
-                error.args = (_in_python(str(error), kind),)
+                error.args = (in_python(str(error), _annotated(kind)),)
                 raise
 
         vars(called)["__signature__"] = _signature(kind, signature(function).return_annotation)
@@ -100,24 +105,6 @@ def keywords(
         return cast("Function[Keywords, Record, Result]", called)
 
     return decorated
-
-
-def _in_python(text: str, record: type[Call]) -> str:
-    """A line for the screen with keywords of Python in place of the record's options."""
-    words = dict(_python_words(record))
-    return OPTION.sub(lambda found: words.get(found[0], found[0]), text)
-
-
-def _python_words(record: type[Call]) -> Iterator[tuple[str, str]]:
-    """Options of a record as they are written, and how Python has them: size, force=True."""
-    for name, kind in _annotated(record).items():
-        of, option = get_args(kind)[:2]
-        # Of an annotation, typer takes its first way of writing for a default.
-        given = (getattr(option, "default", None), *(getattr(option, "param_decls", None) or ()))
-        ways = "/".join(one for one in given if isinstance(one, str)).split("/")
-        plain = name.replace("_", "-")
-        for way in (f"--{plain}", f"--no-{plain}", *ways):
-            yield way, f"{name}={not way.startswith('--no-')}" if of is bool else name
 
 
 def _annotated(record: type) -> dict[str, Any]:
@@ -197,7 +184,7 @@ def _signature(record: type[Call], returned: object) -> Signature:
         if one.name in options
     ]
     rest = [one for one in every if one.name not in options]
-    return Signature([*own, *rest], return_annotation=returned)
+    return LinesSignature([*own, *rest], return_annotation=returned)
 
 
 def _typed(parameter: Parameter) -> Parameter:
@@ -274,7 +261,13 @@ def _allowed(kind: Any, low: float | None, high: float | None) -> str:
 
 def _with_arguments(text: str, record: type[Call]) -> str:
     """A docstring with the record's help texts as its arguments."""
-    texts = {name: get_args(kind)[1] for name, kind in _annotated(record).items()}
-    told = [f"    {name}: {getattr(text, 'help', text)}" for name, text in texts.items()]
+    options = _annotated(record)
+    texts = {name: get_args(kind)[1] for name, kind in options.items()}
+    told = [
+        textwrap.fill(
+            in_python(f"{name}: {getattr(text, 'help', text)}", options), HELP_COLUMNS, **INDENTS
+        )
+        for name, text in texts.items()
+    ]
     summary, *sections = text.rstrip().split("\n\n    ")
-    return "\n\n    ".join([summary, "Args:\n    " + "\n    ".join(told), *sections]) + "\n    "
+    return "\n\n    ".join([summary, "Args:\n" + "\n".join(told), *sections]) + "\n    "

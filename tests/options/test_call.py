@@ -1,6 +1,7 @@
 """One record a command: keywords of Python, options of the command, and one-line refusals."""
 
 import inspect
+import pydoc
 from dataclasses import KW_ONLY, dataclass, replace
 from itertools import repeat
 from pathlib import Path
@@ -133,3 +134,15 @@ def test_refusals_in_python_name_its_keywords(tmp_path: Path) -> None:
 def test_a_record_is_refused_by_the_options_of_the_command() -> None:
     with pytest.raises(InputError, match=r"^--yield .* without --process"):
         tbcad.build(BuildOptions(n=3, wanted_yield=0.9))
+
+
+def test_help_has_a_line_for_each_parameter() -> None:
+    """No addresses, no types of pathlib, nothing wider than a page; options by their keywords."""
+    for name in (one for one in tbcad.__all__ if inspect.isfunction(getattr(tbcad, one))):
+        text = pydoc.plaintext.document(getattr(tbcad, name))
+        assert max(map(len, text.splitlines())) <= 100, name
+        assert " at 0x" not in text
+        assert "pathlib." not in text
+    text = pydoc.plaintext.document(tbcad.build)
+    assert "\n    out: Path | str = 'exports',\n    *,\n" in text
+    assert "With process: share of simulated builds" in text
