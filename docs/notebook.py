@@ -40,7 +40,8 @@ def shown(output: Any, number: int) -> str:
     data = output.get("data", {})
     if png := data.get("image/png"):
         return picture(number, "png", base64.b64decode(png))
-    if html := data.get("text/html"):
+    html = data.get("text/html", "")
+    if SVG.search(html):
         text = SVG.sub("", html).replace("<div>", "").replace("</div>", "")
         return f"{text}\n\n{picture(number, 'svg', SVG.findall(html)[0].encode())}"
     text = output.get("text") or data.get("text/plain", "")
