@@ -40,8 +40,7 @@ def shown(output: Any, number: int) -> str:
     data = output.get("data", {})
     if png := data.get("image/png"):
         return picture(number, "png", base64.b64decode(png))
-    html = data.get("text/html", "")
-    if SVG.search(html):
+    if html := data.get("text/html"):
         text = SVG.sub("", html).replace("<div>", "").replace("</div>", "")
         return f"{text}\n\n{picture(number, 'svg', SVG.findall(html)[0].encode())}"
     text = output.get("text") or data.get("text/plain", "")
