@@ -20,7 +20,7 @@ from tbcad.light.simulate.scene.rays import camera_around_object
 PICTURES = Path(__file__).parent / "pictures"
 PLACES_DEG = ((20, 25), (140, 45), (250, 70))
 SIZE, CUT = (640, 480), (80, 0, 560, 480)
-LABEL_PX, SIDE_PX = 26, 400
+LABEL_PX, SIDE_PX = 38, 400
 BACKGROUND = "white"
 
 
@@ -35,7 +35,7 @@ def captured_views(folder: Path) -> dict[str, list[Image.Image]]:
         place = radians(azimuth), radians(elevation), 640.0
         at = camera_around_object(*place, light_field.capture_mm, SIZE)
         pictures = {
-            "nearest rays (the paper)": views.view(azimuth, elevation, method="nearest").image,
+            "nearest rays (paper)": views.view(azimuth, elevation, method="nearest").image,
             "--method depth": views.view(azimuth, elevation, method="depth").image,
             "--method field": tbcad.Views(field).view(azimuth, elevation).image,
             "ray-traced": true_picture(scene, at),
@@ -49,7 +49,7 @@ def sheet(columns: dict[str, list[Image.Image]]) -> Image.Image:
     """Columns of pictures, each under its name."""
     rows = max(map(len, columns.values()))
     whole = Image.new("RGB", (len(columns) * SIDE_PX, rows * SIDE_PX + LABEL_PX), BACKGROUND)
-    draw, font = ImageDraw.Draw(whole), ImageFont.load_default(17)
+    draw, font = ImageDraw.Draw(whole), ImageFont.load_default(25)
     for k, (name, pictures) in enumerate(columns.items()):
         draw.text((k * SIDE_PX + 6, 3), name, fill="black", font=font)
         for row, picture in enumerate(pictures):
@@ -76,7 +76,7 @@ def main(folder: Path) -> None:
     overview = {
         "object": columns["ray-traced"][:1],
         "mirrors": [squared(machine)],
-        "what one camera photographs": [squared(photograph)],
+        "photograph of one camera": [squared(photograph)],
         "a view of all rays": columns["--method field"][:1],
     }
     sheet(overview).save(PICTURES / "overview.png", optimize=True)

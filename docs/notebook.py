@@ -28,19 +28,20 @@ def executed(path: Path = NOTEBOOK) -> Any:
     return notebook
 
 
-def picture(number: int, suffix: str, content: bytes) -> str:
+def picture(number: str, suffix: str, content: bytes) -> str:
     """Write a picture of the page; its link."""
     name = f"notebook-{number}.{suffix}"
     (PICTURES / name).write_bytes(content)
     return f"![Output of the cell above](pictures/{name})"
 
 
-def shown(output: Any, number: int) -> str:
+def shown(output: Any, number: str) -> str:
     """An output as Markdown; pictures as files."""
     data = output.get("data", {})
     if png := data.get("image/png"):
         return picture(number, "png", base64.b64decode(png))
-    if html := data.get("text/html"):
+    html = data.get("text/html", "")
+    if SVG.search(html):
         text = SVG.sub("", html).replace("<div>", "").replace("</div>", "")
         return f"{text}\n\n{picture(number, 'svg', SVG.findall(html)[0].encode())}"
     text = output.get("text") or data.get("text/plain", "")
@@ -55,9 +56,9 @@ def page(notebook: Any) -> str:
             parts.append(cell.source)
             continue
         parts.append(f"```python\n{cell.source}\n```")
-        parts += [
-            shown(output, number) for output in cell.outputs if output.get("name") != "stderr"
-        ]
+        outputs = [output for output in cell.outputs if output.get("name") != "stderr"]
+        names = (f"{number}-{k}" if k > 1 else f"{number}" for k in range(1, len(outputs) + 1))
+        parts += map(shown, outputs, names)
     return "\n\n".join([parts[0], NOTE, *parts[1:]]) + "\n"
 
 

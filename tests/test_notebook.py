@@ -20,7 +20,7 @@ def notebook() -> Any:
 
 def test_it_is_kept_without_output(notebook: Any) -> None:
     cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    assert len(cells) > 5
+    assert len(cells) == 10
     assert not [cell for cell in cells if cell.outputs or cell.execution_count]
 
 
@@ -50,10 +50,11 @@ def test_it_runs(notebook: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     nbclient.NotebookClient(notebook, timeout=SECONDS, resources=resources).execute()
     shown = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     kinds = [kind for output in shown for kind in output.get("data", {})]
-    assert kinds.count("image/png") == 4  # a plot, both photographs, two views
-    assert kinds.count("text/html") == 1  # the design's map
+    assert kinds.count("image/png") == 6  # a plot, both photographs, four views
+    assert kinds.count("text/html") == 2  # the design's map, the table
     printed = "".join(output.get("text", "") for output in shown)
-    traced, paper = (float(x) for x in re.findall(r"(?:traced|paper) ([\d.]+) mm", printed))
-    assert paper < 60 < traced
+    assert re.search("coverage, spheres.*limit 60", printed)
     assert "valid: True" in printed
-    assert "(True," in "".join(output.get("data", {}).get("text/plain", "") for output in shown)
+    plain = "".join(output.get("data", {}).get("text/plain", "") for output in shown)
+    assert "True" in plain
+    assert "cameras.csv" in plain

@@ -42,7 +42,7 @@ def test_commands_are_those_of_tbcad_or_programs_that_are_there(ages: ModuleType
                 case ["python", program, *_]:
                     assert (ROOT / program).is_file(), name
                 case [program, *_]:
-                    assert program in ("xvfb-run", "cp", "pdftoppm"), name
+                    assert program in ("xvfb-run", "cp", "pdftoppm", "pdftocairo"), name
                 case _:
                     pytest.fail(name)
 

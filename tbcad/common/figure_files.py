@@ -38,10 +38,15 @@ def shades(values: Floats) -> list[str]:
     is needed.
     """
     span = float(np.ptp(values)) or 1.0
-    share = (values - values.min()) / span * (len(_VIRIDIS) - 1)
-    table = np.array(_VIRIDIS).T
-    channels = [np.interp(share, range(len(_VIRIDIS)), row) for row in table]
-    return ["#{:02x}{:02x}{:02x}".format(*map(round, rgb)) for rgb in zip(*channels, strict=True)]
+    colours = shade_bytes((values - values.min()) / span)
+    return ["#{:02x}{:02x}{:02x}".format(*rgb) for rgb in colours.tolist()]
+
+
+def shade_bytes(share: Floats) -> Bytes:
+    """The same colours (..., 3), 0 to 255, of shares from 0 to 1."""
+    table, place = np.array(_VIRIDIS).T, np.asarray(share) * (len(_VIRIDIS) - 1)
+    channels = [np.interp(place, range(len(_VIRIDIS)), row) for row in table]
+    return np.stack(channels, axis=-1).round().astype(np.uint8)
 
 
 def srgb(light: Floats) -> Floats:

@@ -36,7 +36,8 @@ NAMES = ("P", "C", "V")  # apex, centre and virtual camera of the mirror that is
 ELLIPSE_POINTS = 361
 SIDES = (np.array([1, 1]), np.array([-1, 1]))  # camera a's, and mirrored for b
 AROUND_MM = 12.0  # room round the drawing
-CROSS_MM, DOT_MM = 1.5, 0.7  # on paper: half a cross of a virtual camera; radius of a place
+# On paper: half a cross of a virtual camera; radius of a place, height of its name (ISO 3098-1).
+CROSS_MM, DOT_MM, SYMBOL_MM = 1.5, 0.7, 5.0
 BEYOND = 1.6  # of the capture radius: where reflected rays end
 LEVEL_MM, LEADER_MM, LEADER_DEG = 8.0, 12.0, 200.0  # of a dimension and of the leader's corner
 WORDS = "optical_layout.toml"
@@ -212,7 +213,7 @@ def _places(
         yield Line(Layer.CENTRE, middle, at(layout.virtual[k]))
     dots = [Circle(Layer.CUT, at(point), DOT_MM) for point in named.values()]
     yield from dots
-    yield from labels(dots, list(named), straight(drawn))
+    yield from labels(dots, list(named), straight(drawn), height=SYMBOL_MM)
 
 
 def _capture_length(

@@ -53,7 +53,7 @@ class Figure:
     name: str
     unit: str
     limit: float | None  # of the mirror that passes it first, or of a shell; None: any
-    statistics: float | None  # two standard deviations with which the wanted share is good, or any
+    statistics: float | None  # two standard deviations that give the wanted yield, or any
     chain: float  # two standard deviations of the chain, of that mirror; a fillet as it is
     verdict: str
 
@@ -70,23 +70,23 @@ class Chain:
 
     name: str  # as --process has it
     process: Process
-    wanted: float  # share of the shells that must be good
-    good: float  # share of simulated builds that are
+    wanted: float  # yield
+    good: float  # yield of the simulated builds
     figures: tuple[Figure, ...]
     each: Floats  # two standard deviations for each mirror, um, mrad, mm, um, (2 m, kinds)
     mandrel_share: Floats  # of what mandrel and replica have together, the mandrel's, (2 m, kinds)
 
     @property
     def holds(self) -> bool:
-        """Whether enough of its builds are good."""
+        """Whether its yield is the wanted one or more."""
         return self.good >= self.wanted
 
     @property
     def verdict(self) -> str:
         """Whether it holds the design, in words, and what to do where it does not."""
         word = HELD if self.holds else f"{refused(self.name)}, or another chain"
-        share = f"{100 * self.good:.3g} % of {BUILDS} simulated pairs of shells are good"
-        return f"{share}, {100 * self.wanted:.4g} % are wanted: {word}"
+        share = f"yield {100 * self.good:.3g} % of {BUILDS} simulated pairs of shells"
+        return f"{share}, wanted {100 * self.wanted:.4g} %: {word}"
 
 
 def refused(name: str) -> str:
@@ -181,7 +181,7 @@ def _of_mirrors(found: MirrorLimits, each: Floats, name: str) -> list[Figure]:
 
 @dataclass(frozen=True)
 class _Builds:
-    """Simulated builds of an export, and the share of them that must be good."""
+    """Simulated builds of a design, and the yield that is wanted."""
 
     export: ExportedDesign
     errors: Errors  # of the chain
@@ -232,7 +232,7 @@ def sampled(apex: Floats, limits: MirrorLimits, count: int = SAMPLES) -> Ints:
 
 
 def confidence(count: int, good: float = GOOD) -> float:
-    """Confidence that a share of the mirrors is good when a number of random ones are."""
+    """Confidence that a share of the mirrors is within limits when a number of random ones are."""
     return float(1 - good**count)
 
 

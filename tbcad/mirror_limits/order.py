@@ -1,4 +1,4 @@
-"""From an export and a process chain to the files of an order: a table, STEP files, a record.
+"""From a build and a process chain to the files of an order: a table, STEP files, a record.
 
 Tolerances are read back from STEP as a reader gets them, and compared with those that were meant.
 """
@@ -126,7 +126,7 @@ class Half:
 
 
 def halves(export: ExportedDesign, limits: MirrorLimits, chain: Floats) -> tuple[Half, Half]:
-    """Both halves of an export with their part of the limits, and of what a chain holds."""
+    """Both halves of a build with their part of the limits, and of what a chain holds."""
     coat = export.spec.mirrors.coating_um * MM_PER_UM
     m = len(export.reflectors[0])
     a, b = (
@@ -228,7 +228,7 @@ BUILDS, SEED = 50, 1
 
 
 def checked_export(folder: Path, process: Process, chain: str) -> ExportedDesign:
-    """Read an export whose shells a chain can make: its solids are there, no mirror is planar."""
+    """Read a build whose shells a chain can make: its solids are there, no mirror is planar."""
     export, remedies = read_export(folder), {"shell": "build the shell too, tbcad build"}
     if process.mandrel_cutter_mm is not None:
         way = "tbcad build --set shell.negative=true, or with --process"
@@ -319,7 +319,7 @@ def _record(
 
 
 def found_limits(export: ExportedDesign, wanted: float) -> tuple[Sensitivities, MirrorLimits]:
-    """Losses of an export's virtual cameras, and the limits that follow; see `mirror_limits`.
+    """Losses of a build's virtual cameras, and the limits that follow; see `mirror_limits`.
 
     Losses are taken for small deviations. They grow faster than those: another edge of a cell
     becomes the one that limits its coverage. Where edges do not depend on neighbours, deviations

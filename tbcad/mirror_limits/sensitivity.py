@@ -200,7 +200,7 @@ class MirrorLimits:
     """Limits of all mirrors, a first: offset (um), tilt (mrad), radius (mm), walls (um) if any."""
 
     each: Floats  # a mirror may be off by this, whatever others do within theirs, (2 m, kinds)
-    sigma: Floats  # standard deviations with which the wanted share is good, (2 m, kinds)
+    sigma: Floats  # standard deviations with which the yield is as wanted, (2 m, kinds)
     seat_um: float  # by which each half may sit wrong, also with all mirrors at their limits
 
     def part(self, share: Floats) -> "MirrorLimits":
@@ -219,7 +219,7 @@ def mirror_limits(found: Sensitivities, target_mm: float, wanted: float) -> Mirr
     Each kind of deviation, and the seat of the halves, gets an equal part of the margin, and each
     mirror of a virtual camera the same limit; a mirror keeps the smallest limit that its virtual
     cameras ask for. Sums are linear for `each`, and of squares for `sigma`, with which the wanted
-    share of the pairs of shells is good. InputError if a virtual camera sees too little as
+    share of the pairs of shells sees all. InputError if a virtual camera sees too little as
     designed.
     """
     margin = found.coverage - target_mm

@@ -198,21 +198,22 @@ class ReportOptions(Call):
 
 
 def check_yield(wanted_yield: float) -> None:
-    """Refuse a share of good builds that is not between 0 and 1."""
+    """Refuse a yield that is not between 0 and 1."""
     if not 0 < wanted_yield < 1:
         raise InputError(f"--yield {wanted_yield:g}: allowed is above 0, below 1, like 0.99")
 
 
 @dataclass(frozen=True)
 class OrderOptions(Call):
-    """The shells of a build, the process that makes them, and how many must be good."""
+    """The shells of a build, the process that makes them, and the yield wanted."""
 
     exports: Exports[AnyPath]
     _: KW_ONLY
     process: Annotated[str, typer.Option(metavar="NAME|FILE")] = "nickel-diamond"
     """How they are made: nickel-diamond, cnc, sla ... or a TOML file; see tbcad tolerance."""
     wanted: Annotated[float, typer.Option("--yield")] = 0.99
-    """Share of the shells that must be good with the standard deviations."""
+    """Share of the simulated shells whose every virtual camera sees the whole object, with the
+    standard deviations of the process."""
     out: OutReplaced[AnyPath] = Path("order")
     force: Force = False
 

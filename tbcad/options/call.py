@@ -3,6 +3,7 @@
 import ast
 import inspect
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, replace
@@ -33,12 +34,18 @@ from typer.models import ParameterInfo
 from tbcad.common.progress import Progress
 from tbcad.common.screen import Stages
 from tbcad.errors import InputError
+from tbcad.options.python_help import LinesSignature, in_python
 
 Keywords = ParamSpec("Keywords")
 Record = TypeVar("Record")
 Asked_contra = TypeVar("Asked_contra", contravariant=True)
 Result_co = TypeVar("Result_co", covariant=True)
 Result = TypeVar("Result")
+HELP_COLUMNS = 92  # of the arguments in a docstring; help() moves them by four
+INDENTS: dict[str, Any] = {
+    **{"initial_indent": 8 * " ", "subsequent_indent": 12 * " "},
+    **{"break_long_words": False, "break_on_hyphens": False},
+}
 
 
 def silent(_: str) -> None:
@@ -87,7 +94,11 @@ def keywords(
         def called(*args: Any, **kwargs: Any) -> Result:
             if len(args) == 1 and not kwargs and isinstance(args[0], kind):
                 return function(cast("Record", args[0]))
-            return function(record(*args, **kwargs))
+            try:
+                return function(record(*args, **kwargs))
+            except InputError as error:
+                error.args = (in_python(str(error), _annotated(kind)),)
+                raise
 
         vars(called)["__signature__"] = _signature(kind, signature(function).return_annotation)
         called.__doc__ = _with_arguments(function.__doc__ or "", kind)
@@ -173,7 +184,7 @@ def _signature(record: type[Call], returned: object) -> Signature:
         if one.name in options
     ]
     rest = [one for one in every if one.name not in options]
-    return Signature([*own, *rest], return_annotation=returned)
+    return LinesSignature([*own, *rest], return_annotation=returned)
 
 
 def _typed(parameter: Parameter) -> Parameter:
@@ -250,7 +261,13 @@ def _allowed(kind: Any, low: float | None, high: float | None) -> str:
 
 def _with_arguments(text: str, record: type[Call]) -> str:
     """A docstring with the record's help texts as its arguments."""
-    texts = {name: get_args(kind)[1] for name, kind in _annotated(record).items()}
-    told = [f"    {name}: {getattr(text, 'help', text)}" for name, text in texts.items()]
+    options = _annotated(record)
+    texts = {name: get_args(kind)[1] for name, kind in options.items()}
+    told = [
+        textwrap.fill(
+            in_python(f"{name}: {getattr(text, 'help', text)}", options), HELP_COLUMNS, **INDENTS
+        )
+        for name, text in texts.items()
+    ]
     summary, *sections = text.rstrip().split("\n\n    ")
-    return "\n\n    ".join([summary, "Args:\n    " + "\n    ".join(told), *sections]) + "\n    "
+    return "\n\n    ".join([summary, "Args:\n" + "\n".join(told), *sections]) + "\n    "

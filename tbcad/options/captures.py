@@ -137,7 +137,7 @@ class CaptureOptions(Call):
     """Anti-aliasing: a pixel is the mean of N x N rays."""
     geometry: Annotated[
         Geometry,
-        "Mirrors of the record (spheres), of the exported meshes, or the balls of the prototype, "
+        "Mirrors of the record (spheres), of the meshes, or the balls of the prototype, "
         "stop by stop.",
     ] = "spheres"
     optics: Optics = "ideal"

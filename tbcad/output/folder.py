@@ -248,7 +248,7 @@ def _remove_empty(folder: Path) -> None:
 
 
 def _open_new(out: Path, target: Path, kind: Kind, force: bool, undo: ExitStack) -> Path:
-    """Make the folder for the new export; undo unlocks and removes it."""
+    """Make the folder for the new build; undo unlocks and removes it."""
     with locked(target.parent):
         clear(out, target)
         _files_to_keep(out, target, kind, force)

@@ -39,6 +39,15 @@ def check_parts(spec: Spec, parts: Sequence[str]) -> None:
         raise (only_shell_remains(error) if SHELL in parts else error) from None
 
 
+def check_is_used(spec: Spec, parts: Sequence[str]) -> None:
+    """Refuse what is asked of a prototype where none is built, so that it is not silently lost."""
+    if spec.prototype.light.upper is True and PROTOTYPE not in parts:
+        raise SpecError(
+            "prototype.light.upper is true, but no prototype is built: set it to false or auto, or "
+            "build --parts shell,prototype, with mirrors that are not flat"
+        )
+
+
 def check_lists(spec: Spec, parts: Sequence[str]) -> None:
     """Refuse lists of balls and prices that cannot be read: no reason to leave a prototype out.
 

@@ -2,7 +2,7 @@
 
 A run's folder holds
 
-    run.json                 what is to be photographed, of which export, by which camera
+    run.json                 what is to be photographed, of which build, by which camera
     journal.jsonl            what has been done: a line for each event, each safe on disk
     photographs/NAME.png     one image for each exposure (or .tif, .jpg as the camera gives)
     photographs/NAME.json    its sidecar

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from tbcad.cad.formats.assembly import ColouredSolid, SolidGroup, write_assembly
 from tbcad.cad.formats.checked_files import Row, write_table
 from tbcad.cad.kernel.solids import common, one_solid, sphere
-from tbcad.common.figure_files import figure_file
+from tbcad.common.figure_files import figure_file, shade_bytes
 from tbcad.common.results import Table
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.mirrors.array import mirror_ids
@@ -31,8 +31,6 @@ SAME_MM = 1e-6  # centres and radii of a ball's front and body; a cap's are apar
 UM_PER_MM = 1000.0
 LEAST_BALLS = 3  # whose places tell a motion of the whole base from errors of balls
 STEPS = (1.0, 2.0, 5.0)  # of the scale's ends, times powers of ten
-# From none to the largest deviation: blue, green, yellow, red; red, green, blue from 0 to 1.
-COLOURS = np.array([[0.16, 0.38, 0.75], [0.20, 0.66, 0.36], [0.98, 0.83, 0.20], [0.83, 0.15, 0.16]])
 SCHEMA = "tbcad-as-built/1"
 STEP, TABLE, LEGEND, AS_BUILT = "as_built.step", "deviations.csv", "legend.png", "as_built.json"
 COLUMNS = (
@@ -95,9 +93,8 @@ def round_up(value: float) -> float:
 
 
 def colours(share: Floats) -> Floats:
-    """Colours (n, 3), 0 to 1, of shares (n,) of the scale."""
-    places = np.linspace(0, 1, len(COLOURS))
-    return np.stack([np.interp(share, places, column) for column in COLOURS.T], axis=-1)
+    """Colours (n, 3), 0 to 1, of shares (n,) of the scale, for any colour vision."""
+    return shade_bytes(share) / 255
 
 
 def ball_group(machine: Machine, plan: Plan, found: Deviations) -> SolidGroup:

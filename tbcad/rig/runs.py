@@ -78,6 +78,11 @@ class Run(InFolder):
     exposures: Mapping[str, Exposure]  # what has been, by name
     faults: Mapping[str, str]  # for each name that is missing or unusable, why, in one line
 
+    def __repr__(self) -> str:
+        """The run in a line: where it lies, and how many photographs are usable or not."""
+        missing = f", {len(self.faults)} missing or unusable" if self.faults else ""
+        return f"<Run {self.folder}: {len(self.exposures)} photographs{missing}>"
+
     def exposure(self, frame: Frame, phase: str) -> Exposure | None:
         """The exposure of a frame in a phase, if it is usable."""
         return self.exposures.get(exposure_name(frame, phase))

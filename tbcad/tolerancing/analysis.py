@@ -61,7 +61,7 @@ class Analysis:
 
     process: Process
     options: ToleranceOptions
-    target: float  # minimum coverage of a good build, mm
+    target: float  # minimum coverage that a build must have, mm
     cameras: tuple[Reflector, Reflector]  # camera a and b as designed
     edge_models: EdgeModels  # the same for the fast model
     result: CoverageResult
@@ -77,14 +77,14 @@ class Analysis:
 
     @property
     def estimate(self) -> YieldEstimate:
-        """Share of good builds."""
+        """Yield: share of the builds whose every virtual camera sees the target."""
         return estimate_yield(self.result.worst, self.target)
 
 
 def analyse(
     export: ExportedDesign, process: Process, scene_object: SceneObject, options: ToleranceOptions
 ) -> Analysis:
-    """Simulate many builds of an export by a process, and find what limits their yield.
+    """Simulate many builds of a design by a process, and find what limits their yield.
 
     InputError if mirrors are planar, or the scheduler cannot be reached.
     """
@@ -142,7 +142,7 @@ def analyse(
 
 @dataclass(frozen=True)
 class _Simulator:
-    """Simulates builds of one export, all with the same seed and scheduler."""
+    """Simulates builds of one design, all with the same seed and scheduler."""
 
     export: ExportedDesign
     options: ToleranceOptions
@@ -165,7 +165,7 @@ class _Simulator:
         return simulate(case, total, partial(self._run_batches, report=report))
 
     def worst_coverage(self, errors: Errors, models: EdgeModels | None = None) -> Floats:
-        """Minimum coverage of the builds of a search, of the export or of another design."""
+        """Minimum coverage of the builds of a search, of this design or of another."""
         case = CoverageCase(models or self.edge_models, errors, self.options.seed, worst_only=True)
         return simulate(case, SEARCH_BUILDS, self._run_batches).worst
 

@@ -1,8 +1,8 @@
 """Margins on the design's target that a process needs: one for all mirrors, or each its own.
 
-A build is good when no virtual camera loses more than its margin. With the mean m of a mirror's
-loss and its deviation s upwards, each mirror gets the margin m + k s, with one k for all. The least
-k with which the wanted share of builds is good needs no search: it is an order statistic of the
+A build counts for the yield when no virtual camera loses more than its margin. With the mean m of a
+mirror's loss and its deviation s upwards, each mirror gets the margin m + k s, with one k for all.
+The least k with which the wanted yield is reached needs no search: it is an order statistic of the
 largest (loss - m) / s of each build. Radii change a little what errors cost, so the design is made
 again with these margins and simulated again, until they are enough.
 """
@@ -43,7 +43,7 @@ class Margin:
     """The margin that a process needs."""
 
     mm: float | None  # margin beyond the capture diameter; None where no feasible margin is enough
-    share: float  # of good builds at that margin, or at the last one tried
+    share: float  # yield at that margin, or at the last one tried
     reason: str = ""  # why there is none, else ""
 
 
@@ -115,7 +115,7 @@ class OwnMargins:
 
     mm: Floats  # margin of each, (m,)
     average_mm: float  # of those that are not nearly flat, whose coverage is no more than they need
-    share: float  # of good builds, of those judged, of the design with these margins
+    share: float  # yield, of the builds judged, of the design with these margins
 
 
 @dataclass(frozen=True)
@@ -141,11 +141,11 @@ def own_margins(
     progress: Progress = lambda _: None,
     designs: SolvedDesigns | None = None,
 ) -> OwnMargins | None:
-    """Margins with which the wanted share of builds is good, none below the spec's margin_mm.
+    """Margins with which the wanted yield is reached, none below the spec's margin_mm.
 
     One margin for all mirrors, even (mm), is tried first; the spec's radii must follow rule traced.
     The first half of the builds is judged, the other sets means and deviations: builds that did
-    both would seem good more often than others are. None where no try was enough: margins too
+    both would seem enough more often than others are. None where no try was enough: margins too
     large, or mirrors that cannot be made.
     """
     designs = designs or solved_designs()
@@ -192,7 +192,7 @@ def mirror_losses(
 
 
 def needed_margins(losses: MirrorLosses, wanted_yield: float) -> Floats:
-    """The least margins m + k s with which the wanted share of the builds is good, mm, (m,).
+    """The least margins m + k s with which the wanted yield is reached, mm, (m,).
 
     The builds are the first half of those in the losses; m and s are those of the other half.
     Mirrors that are each other's image in y = 0 have the same margin, those of both cameras too:

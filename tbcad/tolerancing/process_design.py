@@ -64,8 +64,8 @@ def design_for_process(
     needed = margin(spec, errors, wanted_yield, _worst_coverage, progress, designs)
     if needed.mm is None:
         raise InputError(
-            f"process {process.name} does not make {wanted_yield:.1%} of the builds good with any "
-            f"margin ({needed.reason}): choose a more exact one, or see tbcad tolerance"
+            f"process {process.name} does not yield {wanted_yield:.1%} with any margin "
+            f"({needed.reason}): choose a more exact one, or see tbcad tolerance"
         )
     if needed.mm <= spec.mirrors.margin_mm:
         return ProcessDesign(spec, spec.mirrors.margin_mm)

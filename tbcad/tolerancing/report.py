@@ -31,8 +31,8 @@ QUANTILES = (0.01, 0.05, 0.5)
 LOW_SHARE = 0.05  # share of the builds whose coverage lies below what table and map show
 NOTES = (
     "Coverage of a virtual camera: twice the minimum distance from the object's centre of all rays "
-    "camera -> edge of its mirror -> reflected. A build is good when every virtual camera covers "
-    "the capture diameter or more. Intervals of yields: Wilson, 95 %.",
+    "camera -> edge of its mirror -> reflected. Yield: share of the builds in which every "
+    "virtual camera covers the capture diameter or more; intervals: Wilson, 95 %.",
     "Pointing: distance from the object's centre of the ray of each mirror's centre pixel in an "
     "uncalibrated build. Calibration makes rays known; it does not restore coverage.",
     "Tolerable factor: factor on one kind of error, without any other, that still gives the wanted "
@@ -62,13 +62,13 @@ def _sentences(analysis: Analysis) -> Iterator[str]:
     if needed.mm is not None:
         yield (
             f"A margin of {needed.mm:.2f} mm (tbcad build --radius-rule traced --set "
-            f"mirrors.margin_mm={needed.mm:.2f}) makes {needed.share:.1%} good."
+            f"mirrors.margin_mm={needed.mm:.2f}) yields {needed.share:.1%}."
         )
     elif analysis.margin:
         yield f"No margin was found that is enough: {needed.reason}."
     if len(options := analysis.process_options) > 1:
         yields = (f"{one.name} {one.estimate.share:.1%}" for one in options)
-        yield f"Good builds, of {options[0].builds} each: {', '.join(yields)}."
+        yield f"Yields of {options[0].builds} builds each: {', '.join(yields)}."
         if analysis.margin:
             yield _margins_sentence(analysis)
     ssim = {name: values.mean() for name, values in vars(analysis.sharpness).items()}
@@ -85,7 +85,7 @@ def _sentences(analysis: Analysis) -> Iterator[str]:
     if analysis.prototype is not None:
         both = analysis.prototype.uncalibrated, analysis.prototype.calibrated
         plain, known = (percent(estimate_yield(one.worst, analysis.target)) for one in both)
-        yield f"Prototype: {plain} good without calibration, {known} with it."
+        yield f"Prototype: yield {plain} without calibration, {known} with it."
 
 
 def in_words(kind: str) -> str:
@@ -102,7 +102,7 @@ def _limit_text(analysis: Analysis, effect: SingleErrorEffect) -> str:
         return "harmless"
     key, error = _error_of(analysis, effect)
     size, unit_name = error.magnitude or error.mean, UNITS[key.rpartition("_")[2]]
-    few = f"fewer than {_wanted(analysis)} of the builds are good"
+    few = f"the yield is below {_wanted(analysis)}"
     if abs(factor - 1) <= FACTOR_TOLERANCE:
         return f"at {size:g} {unit_name} it is at its limit: with more, and no other error, {few}"
     return (
@@ -246,7 +246,7 @@ def tolerance_study(analysis: Analysis) -> Study:
 
 def _figures(analysis: Analysis) -> Iterator[Figure]:
     worst = analysis.result.worst
-    yield Figure("good builds", "%", 100 * analysis.estimate.share)
+    yield Figure("yield", "%", 100 * analysis.estimate.share)
     yield Figure("worst camera, median", "mm", float(np.median(worst)))
     yield Figure("worst camera, 1 % cover less", "mm", float(np.quantile(worst, 0.01)))
     if analysis.margin:
@@ -254,7 +254,7 @@ def _figures(analysis: Analysis) -> Iterator[Figure]:
     for effect in analysis.single_errors:
         yield Figure(f"loss by {in_words(effect.kind)} alone", "mm", effect.loss)
     for option in analysis.process_options:
-        yield Figure(f"good builds by {option.name}", "%", 100 * option.estimate.share)
+        yield Figure(f"yield by {option.name}", "%", 100 * option.estimate.share)
 
 
 def _error_table(analysis: Analysis) -> Table:

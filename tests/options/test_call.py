@@ -1,6 +1,7 @@
 """One record a command: keywords of Python, options of the command, and one-line refusals."""
 
 import inspect
+import pydoc
 from dataclasses import KW_ONLY, dataclass, replace
 from itertools import repeat
 from pathlib import Path
@@ -13,6 +14,7 @@ import typer
 import tbcad
 import tbcad.app.cli  # noqa: F401 - adds all commands
 from tbcad.errors import InputError
+from tbcad.options.builds import BuildOptions
 from tbcad.options.call import Call, keywords, parameters
 from tbcad.options.machines import CalibrateOptions
 from tbcad.options.shared import AnyPath
@@ -110,3 +112,37 @@ def test_public_functions_have_the_options_of_their_commands() -> None:
         command = {one.name for one in leaves()[(name.replace("_", "-"),)].params}
         python = set(inspect.signature(getattr(tbcad, name)).parameters)
         assert command - ONLY_WRITTEN == python - ONLY_PYTHON
+
+
+def test_refusals_in_python_name_its_keywords(tmp_path: Path) -> None:
+    for wrong, said in (
+        (
+            lambda: tbcad.build(n=3, wanted_yield=0.9),
+            "wanted_yield 0.9 is of no use without process",
+        ),
+        (lambda: tbcad.build(n=3, process=" "), "process is ' ', allowed is one of fdm"),
+        (
+            lambda: tbcad.dataset(tmp_path, to="colmap", exports="x"),
+            "exports x is for to mitsuba",
+        ),
+    ):
+        with pytest.raises(InputError) as error:
+            wrong()
+        assert str(error.value).startswith(said)
+
+
+def test_a_record_is_refused_by_the_options_of_the_command() -> None:
+    with pytest.raises(InputError, match=r"^--yield .* without --process"):
+        tbcad.build(BuildOptions(n=3, wanted_yield=0.9))
+
+
+def test_help_has_a_line_for_each_parameter() -> None:
+    """No addresses, no types of pathlib, nothing wider than a page; options by their keywords."""
+    for name in (one for one in tbcad.__all__ if inspect.isfunction(getattr(tbcad, one))):
+        text = pydoc.plaintext.document(getattr(tbcad, name))
+        assert max(map(len, text.splitlines())) <= 100, name
+        assert " at 0x" not in text
+        assert "pathlib." not in text
+    text = pydoc.plaintext.document(tbcad.build)
+    assert "\n    out: Path | str = 'exports',\n    *,\n" in text
+    assert "With process: share of simulated builds" in text

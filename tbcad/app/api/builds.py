@@ -86,7 +86,13 @@ def reusing(fresh: bool, answer: Progress) -> Iterator[None]:
 def planned(options: BuildOptions) -> BuildPlan:
     """Refuse, before any work, what cannot be built or replaced."""
     from tbcad.output.folder import check_replaceable
-    from tbcad.output.parts import check_lists, check_parts, default_parts, parse_parts
+    from tbcad.output.parts import (
+        check_is_used,
+        check_lists,
+        check_parts,
+        default_parts,
+        parse_parts,
+    )
     from tbcad.output.single_files import design_files, files_named
 
     asked = parse_parts(options.parts) if isinstance(options.parts, str) else options.parts
@@ -97,6 +103,7 @@ def planned(options: BuildOptions) -> BuildPlan:
     if asked is not None:
         check_parts(spec, asked)
     parts = default_parts(spec) if asked is None else tuple(asked)
+    check_is_used(spec, parts)
     check_lists(spec, parts)
     file = None if isinstance(options.spec, Spec) else options.spec
     inputs = [*design_files(spec, file), *files_named(options.process)]

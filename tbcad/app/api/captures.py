@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from tbcad.options.call import keywords
 from tbcad.options.captures import CaptureOptions, DatasetOptions
 from tbcad.options.checks import check_is_capture, check_is_export, check_is_object
+from tbcad.options.python_help import in_lines
 from tbcad.options.shared import AnyPath
 
 if TYPE_CHECKING:
@@ -154,6 +155,7 @@ def write_photographs(photographs: Photographs, options: CaptureOptions) -> dict
     return record
 
 
+@in_lines
 def relight(
     capture_folder: Path | str,
     light: Path | str,

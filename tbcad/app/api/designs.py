@@ -12,6 +12,7 @@ from tbcad.core.spec.load import load_spec, option_texts
 from tbcad.errors import InputError
 from tbcad.options.builds import AnyDesign, OptimizeOptions
 from tbcad.options.call import keywords, silent
+from tbcad.options.python_help import in_lines
 
 if TYPE_CHECKING:
     from build123d import Part
@@ -44,6 +45,7 @@ def chosen_spec(spec: AnyDesign | None, n: int | str | None, settings: Settings)
     return load_spec(None if spec is None else Path(spec), options)
 
 
+@in_lines
 def design(
     spec: Spec | Path | str | None = None,
     *,

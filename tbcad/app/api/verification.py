@@ -103,7 +103,8 @@ def checked_process(options: ToleranceOptions) -> Process:
     """The process, when all that can be refused at once has been."""
     from tbcad.tolerancing.process.process import DEFAULT_PROCESS, load_process
 
-    process = load_process(options.process or DEFAULT_PROCESS, option_texts(options.settings))
+    name = DEFAULT_PROCESS if options.process is None else options.process
+    process = load_process(name, option_texts(options.settings))
     if options.builds < LEAST_BUILDS:
         raise InputError(f"--builds {options.builds}: allowed is {LEAST_BUILDS} to 1000000")
     check_yield(options.wanted_yield)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from tbcad.errors import InputError
 from tbcad.options.call import silent
+from tbcad.options.python_help import in_lines
 
 if TYPE_CHECKING:
     from tbcad.core.optics.camera import Camera
@@ -121,6 +122,7 @@ def _of_field(made: Field, camera: Camera) -> SynthesisedView:
     return SynthesisedView(image.astype(np.float32), np.ones(image.shape[:2], dtype=np.bool_))
 
 
+@in_lines
 def view(
     source: LightField | Field | Path | str,
     azimuth_deg: float = 0.0,
@@ -166,6 +168,7 @@ def refocused(
     return refocus_everywhere(tiles, at, lens.aperture_mm, depth.along_rays)
 
 
+@in_lines
 def refocus(
     source: LightField | Path | str,
     azimuth_deg: float = 0.0,

@@ -123,6 +123,7 @@ def labels(
     texts: Iterable[str],
     lines: Sequence[tuple[Point, Point]] = (),
     taken: Sequence[Box] = (),
+    height: float = LABEL_MM,
 ) -> Iterator[Simple]:
     """A label beside each circle on paper, clear of all circles and other texts if there is room.
 
@@ -132,13 +133,13 @@ def labels(
     boxes = [*((x - r, y - r, x + r, y + r) for (x, y), r in rims), *taken]
     ends = np.array(lines).reshape(-1, 2, 2)
     for circle, text in zip(circles, texts, strict=True):
-        places = [*_beside(circle, text)]
+        places = [*_beside(circle, text, height)]
         faults = [
             (any(_meet(one, other) for other in boxes), _crossings(one, ends)) for one in places
         ]
         box = places[faults.index(min(faults))]
         boxes.append(box)
-        yield Text(Layer.DIMENSIONS, (box[0], box[1]), LABEL_MM, text)
+        yield Text(Layer.DIMENSIONS, (box[0], box[1]), height, text)
 
 
 def _crossings(box: Box, ends: Floats) -> int:
@@ -153,16 +154,16 @@ def _crossings(box: Box, ends: Floats) -> int:
     return int(np.sum((enter <= leave) & (leave >= 0) & (enter <= 1)))
 
 
-def _beside(circle: Circle, text: str) -> Iterator[Box]:
+def _beside(circle: Circle, text: str, height: float) -> Iterator[Box]:
     """Places of a label: at the corners, then at the sides, then farther away."""
-    width = text_width(text, LABEL_MM)
+    width = text_width(text, height)
     for gap in LABEL_GAPS_MM:
         for right, up in SIDES:
             reach = circle.radius + gap
             beside = {1: reach, 0: -width / 2, -1: -reach - width}
-            above = {1: reach, 0: -LABEL_MM / 2, -1: -reach - LABEL_MM}
+            above = {1: reach, 0: -height / 2, -1: -reach - height}
             left, low = circle.centre[0] + beside[right], circle.centre[1] + above[up]
-            yield left, low, left + width, low + LABEL_MM
+            yield left, low, left + width, low + height
 
 
 def _meet(one: Box, other: Box) -> bool:

@@ -145,7 +145,7 @@ def without_slack(shape: TopoDS_Shape) -> TopoDS_Shape:
 
 
 def closed_mesh(name: str, shape: TopoDS_Shape, tolerance: float) -> Mesh:
-    """The mesh of a solid as it is exported, no farther than a tolerance (mm) from the surface.
+    """The mesh of a solid as it is written, no farther than a tolerance (mm) from the surface.
 
     InvalidSolidError if it is not closed: a face may be valid and yet have no mesh.
     """

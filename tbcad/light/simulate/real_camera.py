@@ -1,4 +1,4 @@
-"""The real camera of an export: its lens by camera.json, and how its mirrors reflect."""
+"""The real camera of a build: its lens by camera.json, and how its mirrors reflect."""
 
 from collections.abc import Sequence
 

@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 from pydantic import Field
-from tbcad_verify.report.as_made import NOT_MODELLED, AsMade, ProcessYield, enough_bad
+from tbcad_verify.report.as_made import GOOD, NOT_MODELLED, AsMade, ProcessYield, enough_bad
 from tbcad_verify.report.methods import KEY_FIGURES
 
 from tbcad.cad.formats.checked_files import Finite, Record, read_json
@@ -134,11 +134,12 @@ def _shells(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
         yield "<div class='card unknown'><h2>Shells</h2>"
         yield f"<p class=big>? not simulated</p><p>{escape(reason)}.</p></div>"
         return
-    good = [f"{one.process} {one.text}" for one in as_made.processes if one.is_good]
+    good = [f"{one.text} by {one.process}" for one in as_made.processes if one.is_good]
     state, sign, _ = STATES[bool(good)]
     yield f"<div class='card {state}'><h2>Shells</h2><p class=big>"
     yield f"<span aria-hidden=true>{sign}</span> "
-    yield f"{escape(', '.join(good)) or 'no built-in process makes them'}</p>"
+    text = f"yield {', '.join(good)}" if good else f"no built-in process yields {GOOD:.0%}"
+    yield f"{escape(text)}</p>"
     yield _yield_words(as_made.builds, target_mm)
     yield _yields(as_made.processes)
     yield (
@@ -149,7 +150,7 @@ def _shells(as_made: AsMade | None, target_mm: float) -> Iterator[str]:
 
 
 def _prototype(verdict: Verdict | None, as_made: AsMade | None, target_mm: float) -> Iterator[str]:
-    """How many calibrated prototypes are good, and what the printer cannot make."""
+    """The yield of calibrated prototypes, and what the printer cannot make."""
     made = as_made.prototype if as_made else None
     parts = [one for one in verdict.checks if one.name == PRINTABLE] if verdict else []
     failed = [one for one in parts if one.passed is not True]
@@ -157,7 +158,7 @@ def _prototype(verdict: Verdict | None, as_made: AsMade | None, target_mm: float
     state, sign, _ = STATES[good]
     yield f"<div class='card {state}'><h2>Prototype</h2><p class=big>"
     yield f"<span aria-hidden=true>{sign}</span> "
-    yield "not simulated</p>" if made is None else f"{made.text} good once calibrated</p>"
+    yield "not simulated</p>" if made is None else f"yield {made.text} once calibrated</p>"
     if as_made and made:
         yield _yield_words(as_made.builds, target_mm)
         yield _yields([made])

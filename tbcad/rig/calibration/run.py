@@ -86,7 +86,9 @@ def calibrate_run(options: CalibrateOptions) -> WrittenCalibration:
     folder, exports, out = Path(options.run), Path(options.exports), Path(options.out)
     progress, detail = options.progress, options.detail
     progress("run and build")
-    process = load_process(options.process or DEFAULT_PROCESS, options.settings)
+    process = load_process(
+        DEFAULT_PROCESS if options.process is None else options.process, options.settings
+    )
     run = read_run(folder)
     check_same_export(folder, run.record, exports)
     machines = {name: run.of_frames(frames) for name, frames in run.record.machines.items()}

@@ -129,7 +129,7 @@ def joined_results(results: Sequence[AnyResult]) -> AnyResult:
 def coverage_at_yield(worst: Floats, share: float) -> float:
     """Coverage, mm, that a share of the builds reach with their worst camera (s,).
 
-    It is at least the target exactly where that share of them is good: an order statistic, without
+    It is at least the target exactly where the yield is that share: an order statistic, without
     interpolation between two builds.
     """
     bad = int((1 - share) * len(worst) + 1e-9)
@@ -156,7 +156,7 @@ def wilson_interval(good: int, count: int) -> tuple[float, float]:
 
 
 def yield_sentence(process: Process, worst: Floats, target: float) -> str:
-    """How many builds are good, by minimum coverage of each (s,), and what a median one covers."""
+    """Yield of builds, by minimum coverage of each (s,), and what a median one covers."""
     return (
         f"Built by {process.name} ({process.title}), "
         f"{percent(estimate_yield(worst, target))} of the builds "
@@ -186,7 +186,7 @@ class SingleErrorEffect:
 
     kind: str  # its name, as in Errors
     loss: float  # mean coverage that the worst virtual camera loses, mm
-    loss_at_yield: float  # the same in the worst build of those that are to be good, mm
+    loss_at_yield: float  # the same in the worst build of those that are to see all, mm
     tolerable_factor: float  # on the error, at which the yield is just reached; may be inf
 
 

@@ -146,6 +146,11 @@ def load_process(which: str, overrides: Sequence[str] = ()) -> Process:
 
     SpecError: anything that cannot be read, is unknown, or is not allowed.
     """
+    if not which.strip():
+        raise SpecError(
+            f"process is {short_text(which)}, allowed is one of {', '.join(BUILT_IN)} or a TOML "
+            "file: name one"
+        )
     name = f"built-in process {which}" if which in BUILT_IN else which
     table = _built_in(which) if which in BUILT_IN else _own(Path(which))
     options = [_option(text) for text in overrides]

@@ -11,7 +11,6 @@ from skimage.metrics import structural_similarity
 
 from tbcad.light.simulate.image_files import (
     ANIMATED_SUFFIXES,
-    difference,
     write_animation,
 )
 from tbcad.light.simulate.parallel import first_then_threads, over_chunks
@@ -32,11 +31,6 @@ def test_animations_run_forward_and_back(tmp_path: Path, suffix: str) -> None:
     with Image.open(file) as film:
         levels = [np.asarray(f.convert("RGB"))[0, 0, 0] for f in ImageSequence.Iterator(film)]
     assert levels == [0, 80, 160, 240, 160, 80]
-
-
-def test_difference_has_no_sign() -> None:
-    assert (difference(RED, BLUE) == [255, 0, 255]).all()
-    assert np.array_equal(difference(RED, BLUE), difference(BLUE, RED))
 
 
 @pytest.mark.parametrize("level", [0, 90])

@@ -98,7 +98,7 @@ def test_verdict_is_on_top(export: Path) -> None:
     text = page(export, made)
     assert text.index("PASS") < text.index('id="model"')
     assert "74% of 50" in text
-    assert "no built-in process makes them" in text
+    assert "no built-in process yields 95%" in text
     assert "&lt;fdm&gt;" in text
     assert "<fdm>" not in text
     changed_verdict(export, **{"pass": False})

@@ -16,6 +16,7 @@ from tests.prototype_records import UPPER_LAMPS
 
 pytestmark = pytest.mark.corpus
 
+TIE = re.compile(r"- (?P<kind>[a-z ]+): (?P<names>.*?): (?P<by>[^`]+)")
 FIELDS = Path(__file__).parents[3] / "docs" / "fields.md"
 KINDS = {"measured", "worked out", "spec", "form", "hash"}
 TOTALS = {f"totals.{name}_price" for name in ("bought", "tools", "filament")}
@@ -49,14 +50,18 @@ def fields(folder: Path) -> dict[str, set[str]]:
 def ties() -> dict[str, set[str]]:
     """Fields of the list, by file."""
     text = FIELDS.read_text(encoding="utf-8")
-    table = text.partition("<!-- ties: begin -->")[2].partition("<!-- ties: end -->")[0]
+    lists = text.partition("<!-- ties: begin -->")[2].partition("<!-- ties: end -->")[0]
     found: dict[str, set[str]] = {}
-    for line in table.strip().splitlines()[2:]:
-        files, kind, names, by = (cell.strip() for cell in line.strip("|").split(" | "))
-        assert kind in KINDS, line
-        assert by, line
-        for file in re.findall("`([^`]+)`", files):
-            mine = set(re.findall("`([^`]+)`", names))
+    files: list[str] = []
+    for line in filter(None, lists.splitlines()):
+        if line.startswith("**"):
+            files = re.findall("`([^`]+)`", line)
+            continue
+        tie = TIE.fullmatch(line)
+        assert tie, line
+        mine = set(re.findall("`([^`]+)`", tie["names"]))
+        assert tie["kind"] in KINDS, line
+        for file in files:
             assert not found.get(file, set()) & mine, f"{file}: two ties in {line}"
             found.setdefault(file, set()).update(mine)
     return {name: some for name, some in found.items() if name.endswith((".json", ".csv"))}

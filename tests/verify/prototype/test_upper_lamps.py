@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from tbcad_verify.mesh.mesh import indexed_mesh
 from tbcad_verify.prototype.assembly import Shape
+from tbcad_verify.prototype.bodies import body_scene
+from tbcad_verify.prototype.light import ball_views
 from tbcad_verify.prototype.light.upper_lamps import _faults, _meets_face
 from tbcad_verify.record.prototype import UpperLamps
 from tbcad_verify.types import Floats
@@ -94,3 +98,19 @@ def test_only_the_front_of_what_shines_dazzles() -> None:
     point = np.array([[0.0, -80.0, -60.0], [0.0, 80.0, 60.0], [5.0, -80.0, -60.0]])
     along = np.array([[0.0, 0.8, 0.6], [0.0, -0.8, -0.6], [0.0, 0.8, 0.6]])
     assert _meets_face(led, upper, point, along).tolist() == [True, False, False]
+
+
+def test_rays_that_boards_stop_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of four rays one is stopped on its way to the ball, one after it, one beyond the object."""
+    corners = np.array([[x, y, 0.0] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
+    board = indexed_mesh(corners, np.array([[0, 1, 3], [0, 3, 2]], dtype=np.int32))
+    point = np.array([[0.0, 0.0, -5.0], [0.2, 0.1, 5.0], [0.2, 0.1, 5.0], [5.0, 0.0, 5.0]])
+    pinhole, down = np.array([0.0, 0.0, 20.0]), np.tile([0.0, 0.0, -1.0], (4, 1))
+    before = (point - pinhole) / np.linalg.norm(point - pinhole, axis=1)[:, None]
+    paths = ball_views.RayPaths(point, before, down, np.array([1.0, 9.0, 4.0, 9.0]))
+    pixel = Mock(mirror=np.zeros(4, dtype=np.intp))
+    monkeypatch.setattr(ball_views, "ray_paths", lambda *_: paths)
+    measured = Mock(above=body_scene({"board": board}), context=Mock(pinhole=pinhole))
+    stopped = ball_views.stopped_above(measured, pixel)
+    assert stopped.tolist() == [True, True, False, False]
+    assert not ball_views.stopped_above(Mock(above=body_scene({})), pixel).any()

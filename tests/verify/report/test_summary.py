@@ -76,9 +76,9 @@ def test_pass_with_all_there_is(long_report: Report) -> None:
     lines = fits(shown(replace(long_report, programs=asked)))
     assert len(lines) == MAX_LINES
     assert lines[0].endswith(", on 16 balls too")
-    assert lines[1] == "Shells: good by diamond 98%"
-    assert lines[2] == "Prototype: 12/15 good, printed by FDM, calibrated; all 2 parts can be made"
-    assert "50 simulated builds, or until 3 fail;" in lines[-7]  # 47 of 50 are 94 %
+    assert lines[1] == "Shells: yield 98% by diamond"
+    assert lines[2] == "Prototype: yield 12/15, printed by FDM, calibrated; all 2 parts can be made"
+    assert "50 simulated builds, or until 3 fail," in lines[-7]  # 47 of 50 are 94 %
     assert lines[-6] == "  diamond 98% 60, cnc 7/10 60, sla 0/5 51.4; prototype 12/15 59.9"
     assert "9 questions to other programs skipped" in lines[-4]
     assert lines[-3].startswith("No prototype: ")
@@ -104,7 +104,7 @@ def test_parts_that_the_printer_cannot_make_are_counted(long_report: Report) -> 
 def test_no_process_and_no_simulation_are_said(long_report: Report) -> None:
     bad = (ProcessYield("fdm", 0.0, 42, 5), ProcessYield("cnc", 0.8, 59.98, 15))
     for made, said in (
-        (AsMade(50, bad), "good by no built-in process; best: cnc 12/15"),
+        (AsMade(50, bad), "no built-in process yields 95%; best: 12/15 by cnc"),
         (AsMade(50, reason="the mirrors are planar"), "yield not simulated: the mirrors are"),
         (None, "tbcad tolerance FOLDER simulates builds"),
     ):

@@ -38,8 +38,8 @@ from tbcad_verify.report.text import WIDTH, figure, limit_text, shortened, table
 from tbcad_verify.types import Floats, Ints, Progress
 
 HEAD = (
-    "ball mirrors short coverage  off by  shim of pad 1, 2, 3 radius off  shimmed",
-    "                         mm      um       um     um     um        um       mm",
+    "ball mirrors short coverage position shim of pad 1, 2, 3     radius  shimmed",
+    "                         mm error um      um     um     um  error um       mm",
 )
 NOTE = (
     "A shim goes between pad and ball; a negative one is taken off the pad. 'shimmed'",

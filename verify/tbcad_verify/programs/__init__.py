@@ -1,4 +1,4 @@
-"""Programs that users open the exported files with, and what they report about a build.
+"""Programs that users open the files of a build with, and what they report about a build.
 
 The verification does not need them. Where they are installed, they are a second opinion from code
 that neither tbcad nor the verification shares. Each runs as a child process with a time limit, on

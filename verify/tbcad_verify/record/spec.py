@@ -24,7 +24,7 @@ OR_AUTO = WrapValidator(_or_auto)
 
 
 def _cap_making(value: object) -> object:
-    """Words as they are; true and false of exports from before there were words."""
+    """Words as they are; true and false of builds from before there were words."""
     return {True: "printed", False: "none"}[value] if isinstance(value, bool) else value
 
 
@@ -39,7 +39,7 @@ class OpticsSpec(Strict):
         Annotated[float, Field(ge=-10_000, lt=0)],
     ] = Field(strict=False)
     semi_minor_mm: float = Field(ge=1, le=5000)
-    # Exports of before this key have no stretch.
+    # Builds of before this key have no stretch.
     stretch: tuple[Annotated[float, Field(ge=0.5, le=2)], Annotated[float, Field(ge=0.5, le=2)]] = (
         Field((1.0, 1.0), strict=False)
     )
@@ -58,7 +58,7 @@ class MirrorsSpec(Strict):
 
     radius_rule: Literal["traced", "paper", "flat"]
     margin_mm: float = Field(ge=0, le=20)
-    # Exports from before this key have none.
+    # Builds from before this key have none.
     own_margins_mm: list[Annotated[float, Field(ge=0, le=20)]] = Field(
         default=[], max_length=50_000
     )
@@ -94,7 +94,7 @@ class ShellSpec(Strict):
     negative: bool = False
     seam_flange: FlangeSpec
     foot_flange: FlangeSpec
-    # Exports from before this section have no lamps.
+    # Builds from before this section have no lamps.
     lamps: ShellLampsSpec = ShellLampsSpec()
 
 

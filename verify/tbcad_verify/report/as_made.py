@@ -8,7 +8,7 @@ from dataclasses import dataclass
 NOT_MODELLED = "lens 2 mm, shadows"
 """By no simulated build; the figure is of the paper's design: docs/tolerance.md has them all."""
 MOST, NEAREST = 3, 2  # processes that can, and that cannot, of which the verdict tells
-GOOD = 0.95  # share of few builds that stands for a process that can make a design
+GOOD = 0.95  # share of few builds: a process with this yield can make a design
 NOT_SIMULATED = "tbcad tolerance FOLDER simulates builds with manufacturing errors"
 FILLETS = "a cutter's fillets, rounding of ridges"
 WIDEST = 80  # columns of a line
@@ -49,7 +49,7 @@ class AsMade:
 
 
 def enough_bad(builds: int) -> int:
-    """Bad builds with which a process is not good, however the others of so many are."""
+    """Failed builds with which the yield is too small, however the others of so many are."""
     return int(builds * (1 - GOOD) + 1e-9) + 1
 
 
@@ -59,11 +59,12 @@ def shells_line(as_made: AsMade | None) -> str:
         return f"Shells: {NOT_SIMULATED}"
     if not as_made.processes:
         return f"Shells: yield not simulated: {as_made.reason or 'the record cannot be read'}"
-    good = [f"{one.process} {one.text}" for one in as_made.processes if one.is_good]
+    good = [f"{one.text} by {one.process}" for one in as_made.processes if one.is_good]
     if good:
-        return f"Shells: good by {', '.join(good[:MOST])}"
+        more = f" and {len(good) - MOST} more" if len(good) > MOST else ""
+        return f"Shells: yield {', '.join(good[:MOST])}{more}"
     best = max(as_made.processes, key=lambda one: (one.share, one.coverage_mm))
-    return f"Shells: good by no built-in process; best: {best.process} {best.text}"
+    return f"Shells: no built-in process yields {GOOD:.0%}; best: {best.text} by {best.process}"
 
 
 def prototype_line(as_made: AsMade | None, parts: int, unprintable: int) -> str:
@@ -74,7 +75,7 @@ def prototype_line(as_made: AsMade | None, parts: int, unprintable: int) -> str:
     made = as_made.prototype if as_made else None
     if made is None:
         return f"Prototype: yield not simulated; {printer}"
-    return f"Prototype: {made.text} good, printed by {made.process.upper()}, calibrated; {printer}"
+    return f"Prototype: yield {made.text}, printed by {made.process.upper()}, calibrated; {printer}"
 
 
 def as_made_lines(as_made: AsMade | None, target_mm: float, valleys: bool) -> Iterator[str]:
@@ -84,15 +85,15 @@ def as_made_lines(as_made: AsMade | None, target_mm: float, valleys: bool) -> It
         return
     fail = enough_bad(as_made.builds)
     yield (
-        f"Good: all see {target_mm:g} mm. {as_made.builds} simulated builds, or until "
-        f"{fail} fail; median minimum, mm:"
+        f"Yield: share of {as_made.builds} simulated builds, or until {fail} fail, that see "
+        f"{target_mm:g} mm; medians:"
     )
     yield _medians(as_made)
     yield f"  left out: {NOT_MODELLED}{'; fillets, ridges not in solids' * valleys}"
 
 
 def _medians(as_made: AsMade) -> str:
-    """As many processes as a line has room for, the good ones first, and the prototype."""
+    """As many processes as a line has room for, those of the verdict first, and the prototype."""
     good = [one for one in as_made.processes if one.is_good][:MOST]
     others = [one for one in as_made.processes if not one.is_good][:NEAREST]
     shown = [*good, *others]

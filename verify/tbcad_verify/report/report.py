@@ -41,7 +41,7 @@ Output = Literal["summary", "full", "quiet", "json"]
 
 @dataclass(frozen=True)
 class Report:
-    """The verification of one export.
+    """The verification of one build.
 
     Attributes:
         target_mm: diameter that every virtual camera must see.

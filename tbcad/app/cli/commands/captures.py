@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 MeshOption = Annotated[bool, typer.Option("--mesh")]
-"""Trace the exported meshes instead of the recorded spheres."""
+"""Trace the build's meshes instead of the recorded spheres."""
 PrototypeOption = Annotated[bool, typer.Option("--prototype")]
 """Trace the balls of the prototype, stop by stop, and merge the photographs into those of the
 shell."""

@@ -143,7 +143,7 @@ def tolerance(
         checked_process(options)  # before heavy libraries are loaded
     check_tables(out)
     if as_built is not None:
-        if options.process or options.margins or options.settings:
+        if options.process is not None or options.margins or options.settings:
             raise InputError(
                 "--as-built is about no process: leave out --process, --margins and --set"
             )

@@ -54,7 +54,7 @@ def write_compared(
     out: Path, picture: "Bytes", truth: "Bytes | None", names: tuple[str, str]
 ) -> None:
     """Write the picture, and a comparison with the ground truth where it is known."""
-    from tbcad.light.simulate.image_files import difference, side_by_side, write_images
+    from tbcad.light.simulate.image_files import compared, write_images
     from tbcad.light.simulate.views.viewpoints import image_quality
 
     if truth is None:
@@ -62,9 +62,7 @@ def write_compared(
         typer.echo(f"{out}: written, without ground truth: the capture names no object")
         return
     files = compared_files(out)
-    sheet = side_by_side(
-        {names[0]: picture, names[1]: truth, "difference": difference(truth, picture)}
-    )
+    sheet = compared({names[0]: picture, names[1]: truth})
     write_images({out: picture, files[0]: truth, files[1]: sheet})
     typer.echo(image_quality(truth, picture).words(names[1]))
     typer.echo(f"{out}, {files[0].name}, {files[1].name}: written")

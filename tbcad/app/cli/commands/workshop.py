@@ -194,14 +194,18 @@ def assembly(
     Each step names its parts by their numbers in the list, torque or fit, and what to check. Exit
     code 0, or 2 for bad input.
     """
+    from tbcad.errors import InputError
     from tbcad.prototype.assembly_steps.instructions import instructions
     from tbcad.prototype.assembly_steps.machine import read_machine
     from tbcad.prototype.assembly_steps.steps import record
     from tbcad.records.design import NAME as DESIGN
     from tbcad.records.design import DesignRecord
+    from tbcad.report.assembly_page import NAME as PAGE
     from tbcad.report.assembly_page import write_page
 
     check_is_folder(folder)
+    if out.suffix.lower() in (".html", ".htm"):
+        raise InputError(f"{out}: allowed is a folder, which gets {PAGE}: name one with --out")
     machine = read_machine(folder)
     told = instructions(machine, DesignRecord.read(folder / DESIGN).spec.printer)
     steps = told.steps

@@ -1,4 +1,4 @@
-"""The exported meshes: facets say which mirror a ray meets, spheres fitted to them where it goes.
+"""The meshes of a build: facets say which mirror a ray meets, spheres fitted to them where it goes.
 
 A facet reflects like a flat mirror, which deflects rays by some 2 mm at the object
 (docs/decisions/0003). Its vertices lie on the sphere, though, so the ray is reflected by the

@@ -18,7 +18,7 @@ from tbcad.types import Bools, Floats
 
 
 def upper_facets(folder: Path, wider: bool = False) -> Floats:
-    """Facets (f, 3, 3) round boards and rods of an export, mm; without any, or prototype: none.
+    """Facets (f, 3, 3) round boards and rods of a build, mm; without any, or prototype: none.
 
     wider: by the tolerance of their places, to all sides.
 

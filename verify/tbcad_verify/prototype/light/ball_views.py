@@ -86,8 +86,19 @@ class BallViews:
     rays: Ints  # (m,) that were traced: pixels, and rings out to the rim of the capture sphere
     blocked: Ints  # (m,) of them that something stops, or that miss the ball
     blockers: tuple[str, ...]  # what stops them, each once
-    pixels: Floats  # (m,) whose ray meets the capture sphere after the ball
+    # (m,) whose ray meets the capture sphere after the ball, and no LED or rod above the object
+    pixels: Floats
     pixels_shell: Floats  # (m,) after the mirror
+
+
+@dataclass(frozen=True)
+class RayPaths:
+    """Rays from the pinhole by their balls to the object, where the machine stands."""
+
+    point: Floats  # (N, 3) on the ball, mm
+    before: Floats  # (N, 3) unit, from the pinhole
+    after: Floats  # (N, 3) unit, from the ball
+    reach: Floats  # (N,) from the ball to where the ray is nearest to the object's middle, mm
 
 
 @dataclass(frozen=True)
@@ -107,6 +118,7 @@ def ball_views(measured: MeasuredPrototype, pixel: PixelRays) -> BallViews:
     outlines, nearest = ended_on_balls(transfer, cells)
     rim, rim_mirror = _rim_rays(transfer, outlines, nearest)
     mirror, count = np.append(rim_mirror, pixel.mirror), shell.radius.size
+    weight = np.where(stopped_above(measured, pixel), 0.0, pixel.weight)
     blocked, blockers = blocked_rays(transfer, mirror, np.hstack([rim, pixel.direction]))
     return BallViews(
         _coverage(transfer, outlines, nearest),
@@ -114,7 +126,7 @@ def ball_views(measured: MeasuredPrototype, pixel: PixelRays) -> BallViews:
         np.bincount(mirror, minlength=count),
         np.bincount(mirror[blocked], minlength=count),
         blockers,
-        np.bincount(pixel.mirror, pixel.weight, count).astype(np.float64),
+        np.bincount(pixel.mirror, weight, count).astype(np.float64),
         pixel.shell,
     )
 
@@ -258,6 +270,29 @@ def pixel_rays(measured: MeasuredPrototype) -> PixelRays:
     area = np.full(int(in_shell.sum()), float(step**2))
     shell_count = np.bincount(mirror[in_shell], area, shell.radius.size).astype(np.float64)
     return PixelRays(d[:, in_prototype], mirror[in_prototype], weight[in_prototype], shell_count)
+
+
+def ray_paths(measured: MeasuredPrototype, pixel: PixelRays) -> RayPaths:
+    """Paths of the pixels' rays, each at its stop."""
+    transfer = ray_transfer(measured)
+    to_ball, rays = transfer.reflected(pixel.mirror, pixel.direction)
+    base = transfer.base[pixel.mirror]
+    point, after = (base.apply(np.array(x.T)) for x in (rays.point, unit(rays.toward)))
+    nearest = base.apply(np.array(nearest_on_rays(rays).T))
+    before = base.apply(np.array(unit(to_ball).T))
+    return RayPaths(point, before, after, np.linalg.norm(nearest - point, axis=1))
+
+
+def stopped_above(measured: MeasuredPrototype, pixel: PixelRays) -> Bools:
+    """Which rays (N,) boards and rods of LEDs above the object stop, before or after the ball."""
+    above = measured.above
+    if above.scene is None:
+        return np.zeros(pixel.mirror.size, dtype=np.bool_)
+    paths = ray_paths(measured, pixel)
+    origin = np.broadcast_to(measured.context.pinhole, paths.point.shape)
+    to_ball = np.linalg.norm(paths.point - origin, axis=1)
+    stopped = above.first(origin.T, paths.before.T)[1] < to_ball
+    return np.asarray(stopped | (above.first(paths.point.T, paths.after.T)[1] < paths.reach))
 
 
 class Reflecting(Protocol):

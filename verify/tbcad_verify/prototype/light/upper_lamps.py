@@ -14,7 +14,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tbcad_verify.mesh.surfaces import nearest_on_rays
 from tbcad_verify.mesh.vectors import norm, unit
 from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.bodies import (
@@ -24,7 +23,7 @@ from tbcad_verify.prototype.bodies import (
     stage_bodies,
 )
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.light.ball_views import pixel_rays, ray_transfer
+from tbcad_verify.prototype.light.ball_views import pixel_rays, ray_paths, stopped_above
 from tbcad_verify.prototype.light.lamp_light import irradiance
 from tbcad_verify.record.prototype import GLB, Lamps, UpperLamps, UpperLed
 from tbcad_verify.report.checks import Check, CheckName, Unknown, at_most, informative, no_faults
@@ -168,17 +167,10 @@ def _seen_normals(context: PrototypeContext) -> Floats:
 
 def _rays(measured: MeasuredPrototype, upper: UpperLamps) -> tuple[float, float]:
     """Shares of the pixels' rays that boards and rods stop, and that end on an LED's light, %."""
-    pixel, transfer = pixel_rays(measured), ray_transfer(measured)
-    to_ball, rays = transfer.reflected(pixel.mirror, pixel.direction)
-    base = transfer.base[pixel.mirror]
-    pinhole = measured.context.pinhole
-    point, after = (base.apply(np.array(x.T)) for x in (rays.point, unit(rays.toward)))
-    before = base.apply(np.array(unit(to_ball).T))
-    origin = np.broadcast_to(pinhole, point.shape)
-    stopped = measured.above.first(origin.T, before.T)[1] < np.linalg.norm(point - origin, axis=1)
-    nearest = np.linalg.norm(base.apply(np.array(nearest_on_rays(rays).T)) - point, axis=1)
-    stopped |= measured.above.first(point.T, after.T)[1] < nearest
-    dazzled = np.any([_meets_face(led, upper, point, after) for led in upper.leds], axis=0)
+    pixel = pixel_rays(measured)
+    paths, stopped = ray_paths(measured, pixel), stopped_above(measured, pixel)
+    met = [_meets_face(led, upper, paths.point, paths.after) for led in upper.leds]
+    dazzled = np.any(met, axis=0)
     weight = pixel.weight / pixel.weight.sum()
     return 100 * float(weight @ stopped), 100 * float(weight @ (dazzled & ~stopped))
 
