@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-TOLD = json.loads(Path(sys.argv[1]).read_text())
+TOLD = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
 OUT = Path(TOLD["out"])
 
 
@@ -47,9 +47,9 @@ def add_mirrors():
     cloud.materials.append(material("mirror", "ShaderNodeBsdfGlossy", Color=white, Roughness=0.0))
 
 
-def add_object():
-    """The knot; its two materials by part."""
-    lines = Path(TOLD["mesh"]).read_text().splitlines()
+def add_object(path):
+    """An object of a file, and its two materials."""
+    lines = Path(path).read_text(encoding="utf-8").splitlines()
     start = lines.index("end_header") + 1
     count = int(lines[2].split()[-1])
     rows = np.array([line.split() for line in lines[start : start + count]], float)
@@ -74,9 +74,9 @@ def add_object():
         Roughness=TOLD["roughness"],
         IOR=TOLD["index"],
     )
-    bpy.context.collection.objects.link(bpy.data.objects.new("object", mesh))
-    mesh.materials.append(matt)
-    return mesh, {"matt": matt, "gloss": gloss}
+    body = bpy.data.objects.new("object", mesh)
+    bpy.context.collection.objects.link(body)
+    return body, {"matt": matt, "gloss": gloss}
 
 
 def add_lamps():
@@ -151,16 +151,17 @@ def photograph(scene, name):
 bpy.ops.wm.read_factory_settings(use_empty=True)
 scene = bpy.context.scene
 add_mirrors()
-mesh, materials = add_object()
 lamps = add_lamps()
 add_camera(scene)
 set_rays(scene)
-for part in TOLD["parts"]:
-    mesh.materials[0] = materials[part]
+for part, (path, kind, shining) in TOLD["parts"].items():
+    body, materials = add_object(path)
+    body.data.materials.append(materials[kind])
     found = []
-    for number, lamp in enumerate(lamps):
+    for number in shining:
         for other in lamps:
-            other.hide_render = other is not lamp
+            other.hide_render = other is not lamps[number]
         scene.cycles.seed = number
         found.append(photograph(scene, f"{part}_{number}"))
     np.save(OUT / f"{part}.npy", np.array(found))
+    bpy.data.objects.remove(body)

@@ -1,6 +1,6 @@
 """Photographs of `real_machine` by Mitsuba and by Blender; by hand, for it takes minutes.
 
-    python -m tests.clients.render_real mitsuba
+    python -m tests.clients.render_real mitsuba -
     python -m tests.clients.render_real blender PYTHON-WITH-BPY
 
 Writes `rendered/real.npz`. Mirrors are exact spheres in both (Cycles renders points of a cloud as
@@ -18,7 +18,9 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import maximum_filter
 
+from tbcad.light.simulate.scene.object import patterned_ball
 from tests.clients.real_machine import (
+    BALL_MM,
     CROP,
     FINE,
     INDEX,
@@ -31,18 +33,20 @@ from tests.clients.real_machine import (
     SAMPLES,
     WHITE_LUX,
     at_pixels,
+    compared,
     machine,
     steps,
 )
 
 LAMP_RADIANCE = LUMEN / (np.pi * LAMP_MM[0] * LAMP_MM[1])  # lm / (sr mm^2)
-PARTS = ("matt", "gloss")
+# Material and lamps of each part of the light; the ball has one highlight in each mirror.
+PARTS = {"matt": ("matt", range(6)), "gloss": ("gloss", range(6)), "ball": ("gloss", (4,))}
 LAMP_SHOWS = 0.05  # of its luminance: brighter than the knot
 
 
-def object_file(folder: Path) -> Path:
-    """The knot with normals and colours."""
-    one = machine().subject
+def object_file(folder: Path, part: str) -> Path:
+    """The knot, or the ball, with normals and colours."""
+    one = patterned_ball(BALL_MM) if part == "ball" else machine().subject
     colours = np.zeros((len(one.points), 3))
     colours[one.faces] = one.albedo
     lines = ["ply", "format ascii 1.0", f"element vertex {len(one.points)}"]
@@ -52,7 +56,7 @@ def object_file(folder: Path) -> Path:
         " ".join(f"{x:.9g}" for x in row) for row in np.hstack([one.points, one.normals, colours])
     ]
     body += [f"3 {a} {b} {c}" for a, b, c in one.faces.tolist()]
-    path = folder / "object.ply"
+    path = folder / f"{part}.ply"
     path.write_text("\n".join([*lines, "end_header", *body]) + "\n")
     return path
 
@@ -89,7 +93,7 @@ def by_mitsuba(mi: Any, mesh: Path, part: str, lamp: int) -> np.ndarray:
     shapes["object"] = {
         "type": "ply",
         "filename": str(mesh),
-        "bsdf": matt if part == "matt" else gloss,
+        "bsdf": matt if PARTS[part][0] == "matt" else gloss,
     }
     sensor = {
         "type": "thinlens",
@@ -107,7 +111,7 @@ def by_mitsuba(mi: Any, mesh: Path, part: str, lamp: int) -> np.ndarray:
     return np.array(mi.render(scene, seed=lamp))[..., :3]
 
 
-def by_blender(python: str, mesh: Path, folder: Path) -> dict[str, np.ndarray]:
+def by_blender(python: str, meshes: dict[str, Path], folder: Path) -> dict[str, np.ndarray]:
     """The same of all parts, by a process of its own."""
     one = machine()
     camera, mirrors = one.reflector.camera, one.reflector.mirrors
@@ -117,7 +121,6 @@ def by_blender(python: str, mesh: Path, folder: Path) -> dict[str, np.ndarray]:
     told = {
         "centre": mirrors.centre.tolist(),
         "radius": mirrors.radius.tolist(),
-        "mesh": str(mesh),
         "matrix": matrix.tolist(),
         "angle": float(camera.hfov),
         "size": [FINE * camera.width_px, FINE * camera.height_px],
@@ -130,43 +133,47 @@ def by_blender(python: str, mesh: Path, folder: Path) -> dict[str, np.ndarray]:
         "radiance": LAMP_RADIANCE,
         "roughness": ROUGHNESS,
         "index": INDEX,
-        "parts": PARTS,
+        "parts": {p: (str(mesh), PARTS[p][0], list(PARTS[p][1])) for p, mesh in meshes.items()},
         "out": str(folder),
     }
     (folder / "scene.json").write_text(json.dumps(told))
     script = Path(__file__).with_name("blender_photograph.py")
     subprocess.run([python, script, folder / "scene.json"], check=True)
-    return {part: np.load(folder / f"{part}.npy") for part in PARTS}
+    return {part: np.load(folder / f"{part}.npy") for part in meshes}
 
 
 def without_lamps(seen: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Pictures whose pixels that show the lamp itself are black, (l, 2 h, 2 w, 3) each, summed."""
-    lamp = seen["matt"].max(axis=-1) > LAMP_SHOWS * LAMP_RADIANCE
-    near = np.array([maximum_filter(one, 3) for one in lamp])
-    return {part: np.where(near[..., None], 0, one).sum(axis=0) for part, one in seen.items()}
+    result = {}
+    for part, one in seen.items():
+        dull = seen["matt"] if part == "gloss" else one
+        shows = dull.max(axis=-1) > LAMP_SHOWS * LAMP_RADIANCE
+        near = np.array([maximum_filter(lamp, 3) for lamp in shows])
+        result[part] = np.where(near[..., None], 0, one).sum(axis=0)
+    return result
 
 
-def main(renderer: str, python: str = "") -> None:
-    """Render all parts, lamp by lamp, and keep them beside those of the other renderer."""
+def main(renderer: str, python: str, *parts: str) -> None:
+    """Render parts, lamp by lamp, and keep them beside those of the other renderer."""
     with TemporaryDirectory() as temp:
-        mesh = object_file(Path(temp))
+        meshes = {part: object_file(Path(temp), part) for part in parts or PARTS}
         if renderer == "mitsuba":
             import mitsuba as mi
 
             mi.set_variant("scalar_rgb")
-            lamps = range(len(machine().lamps.places))
             found = {
-                part: np.array([by_mitsuba(mi, mesh, part, lamp) for lamp in lamps])
-                for part in PARTS
+                part: np.array([by_mitsuba(mi, mesh, part, lamp) for lamp in PARTS[part][1]])
+                for part, mesh in meshes.items()
             }
         else:
-            found = by_blender(python, mesh, Path(temp))
+            found = by_blender(python, meshes, Path(temp))
     old = dict(np.load(KEPT)) if KEPT.exists() else {}
     # A matt white surface in 1 lm / mm^2 has a luminance of 1 / pi: kept are levels for WHITE_LUX.
     full = np.pi * 255 / (1e-6 * WHITE_LUX)
-    levels = {part: at_pixels(full * light) for part, light in without_lamps(found).items()}
-    new = {f"{renderer}_{part}": steps(one) for part, one in levels.items()}
-    np.savez_compressed(KEPT, **old | new)
+    for part, light in without_lamps(found).items():
+        levels = np.where(compared()[..., None] > 0, at_pixels(full * light), 0)
+        old[f"{renderer}_{part}"] = steps(levels if part == "matt" else levels[..., 0])
+    np.savez_compressed(KEPT, **old)
 
 
 if __name__ == "__main__":

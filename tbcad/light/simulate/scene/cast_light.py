@@ -228,25 +228,20 @@ class Gloss:
         own, one = self.finish.of(facet), self.light
         lamps = one.lamp, one.place, one.area
         surface = corners, behind.astype(np.int64), own.roughness**4, own.index
-        part = _highlights(*spots, *surface, *lamps)
+        part = _highlights(spots, surface, lamps)
         return np.asarray(part[:, :1] * f0 + part[:, 1:] * (1 - f0))
 
 
 @compiled_loop
 def _highlights(
-    weight: Floats,
-    place: Floats,
-    normal: Floats,
-    ray: Floats,
-    corners: Ints,
-    behind: Ints,
-    alpha2: Floats,
-    index: Floats,
-    light: NDArray[np.float32],
-    lamp: Floats,
-    area: Floats,
+    spots: tuple[Floats, Floats, Floats, Floats],
+    surface: tuple[Ints, Ints, Floats, Floats],
+    lamps: tuple[NDArray[np.float32], Floats, Floats],
 ) -> Floats:
     """What is to be multiplied by F0, and by 1 - F0, (k, 2). Lamps of an area widen the lobe."""
+    weight, place, normal, ray = spots
+    corners, behind, alpha2, index = surface
+    light, lamp, area = lamps
     total = np.zeros((len(place), 2))
     for k in range(len(place)):
         point, upward, back = vector(place[k]), vector(normal[k]), vector(ray[k])

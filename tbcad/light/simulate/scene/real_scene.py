@@ -37,9 +37,9 @@ def real_scene(
 ) -> Scene:
     """An object in the light of a prototype's lamps, of a shell's, or in the built-in light: None.
 
-    `gloss`: its roughness; None: as its materials say, which of most files are matt. Shadows are those of lamps. Of the light by a shell's
-    mirrors a surface gets the share that comes from virtual cameras which the object does not hide;
-    the built-in sky casts none.
+    `gloss`: its roughness; None: as its materials say, which of most files are matt. Shadows are
+    those of lamps. Of the light by a shell's mirrors a surface gets the share that comes from
+    virtual cameras which the object does not hide; the built-in sky casts none.
     """
     small = cut_small(subject)
     embree = embree_scene(small.points, small.faces)
