@@ -30,7 +30,7 @@ pytestmark = pytest.mark.clients
 RADIUS, SAMPLES, FINE = 20.0, 144, 6
 LENS = PupilLens(8.0, 134.6)
 ROWS = range(150, 214)
-EDGE_PX, WIDE_PX = 5, 0.5  # reach of an edge; spreads that are compared
+EDGE_PX, WIDE_PX = 5, 0.3  # reach of an edge; spreads that are compared
 
 
 def rendered(mi: Any, one: Reflector) -> Floats:
@@ -184,5 +184,6 @@ def test_knife_edge_in_twelve_mirrors(pictures: Pictures) -> None:
     ours, theirs, expected = np.array(found).T
     wide = expected > WIDE_PX
     assert wide.sum() >= 24
-    assert np.abs(ours / theirs - 1)[wide].mean() < 0.05
-    assert np.abs(ours / expected - 1)[wide].mean() < 0.1
+    assert (ours / theirs)[wide].mean() == pytest.approx(1, abs=0.03)
+    assert np.abs(ours / theirs - 1)[wide].mean() < 0.07
+    assert (ours / expected)[wide].mean() == pytest.approx(1, abs=0.07)  # a disc is no normal blur

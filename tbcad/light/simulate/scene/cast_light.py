@@ -285,4 +285,5 @@ def _fresnel_rise(cosine: float, index: float) -> float:
     across = (cosine - inner) / (cosine + inner)
     along = (index * index * cosine - inner) / (index * index * cosine + inner)
     normal = ((index - 1) / (index + 1)) ** 2
-    return ((across * across + along * along) / 2 - normal) / (1 - normal)
+    rise: float = ((across * across + along * along) / 2 - normal) / (1 - normal)
+    return rise
