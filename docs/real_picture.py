@@ -1,16 +1,19 @@
 """Write docs/pictures/real-optics.png: a photograph by tbcad, Mitsuba and Blender, and differences.
 
-    PYTHONPATH=. python docs/real_picture.py
+    python docs/real_picture.py
 
 Theirs are those that tests/clients/render_real.py has rendered.
 """
 
+import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from tbcad.light.simulate.scene.rays import exact_tracer
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # tests/ is not installed
 from tests.clients.real_machine import CROP, ROUGHNESS, compared, kept, machine, our_light
 
 PICTURE = Path(__file__).parent / "pictures" / "real-optics.png"
