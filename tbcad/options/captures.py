@@ -145,8 +145,8 @@ class CaptureOptions(Call):
     (defocus, astigmatism, diffraction, pixels that show two mirrors), shadows of the lamps, what
     mirrors scatter, noise and steps of the sensor; without light that meets two mirrors."""
     gloss: Annotated[float | None, typer.Option(min=0.05, max=1, metavar="ROUGHNESS")] = None
-    """With --optics real: the object's roughness, from 0.05 (polished) to 1; by default it is
-    matt."""
+    """With --optics real: the object's roughness, from 0.05 (polished) to 1, in place of that of
+    its materials (glTF; MTL by Pr and Pm, or Ns and Ks); by default as these say, else matt."""
     own_light: bool = False
     """Light the object by the shell's own lamps and through its mirrors, in place of the built-in
     light; the prototype's balls are always lit by its lamps."""

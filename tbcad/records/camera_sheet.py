@@ -66,7 +66,7 @@ class RealOpticsRecord(RecordSection):
         lens: camera and lens that the prototype's mount is made for; None: one as needed.
         reflectance: of the mirrors.
         scattered: share of it that mirrors scatter, in the median and at most.
-        gloss: roughness of the object; None: it is matt.
+        gloss: roughness of the object; None: as its materials say, else it is matt.
         white: of a full pixel, which has so many electrons.
     """
 

@@ -29,6 +29,7 @@ RAYS_PER_CHUNK = {"u1": 1 << 16, "f2": 1 << 15}  # 192 kB
 COMPRESSION_LEVEL = 1  # higher ones save 2 % at most
 OBJECT, RECORD = "object.npz", "capture.json"
 SCHEMA = "tbcad-capture/1"
+UNKEPT = {"reading", "finish"}  # of an object: not needed for its matt colours
 TEXTURE = {"uv", "texture", "tiles"}  # arrays of an object that go together
 MAX_OBJECT_BYTES = 4 << 30  # bytes, unpacked
 
@@ -166,8 +167,8 @@ def write_record(folder: Path, record: dict[str, Any]) -> None:
 
 
 def write_object(path: Path, subject: SceneObject) -> None:
-    """Write an object with all that gives its colours; the bytes are the same each time."""
-    kept = (field.name for field in fields(subject) if field.name != "reading")
+    """Write an object with all that gives its matt colours; the bytes are the same each time."""
+    kept = (field.name for field in fields(subject) if field.name not in UNKEPT)
     values = {name: getattr(subject, name) for name in kept}
     arrays = {name: np.asarray(value) for name, value in values.items() if value is not None}
     np.savez_compressed(path, allow_pickle=False, **arrays)

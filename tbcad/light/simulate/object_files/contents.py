@@ -15,6 +15,7 @@ from tbcad.cad.formats.pixels import Picture
 from tbcad.common.figure_files import srgb
 from tbcad.core.geometry.vectors import facet_vectors
 from tbcad.errors import InputError
+from tbcad.light.simulate.object_files.finish import Finish
 from tbcad.types import Bytes, Floats, Ints
 
 Up = Literal["y", "z"]
@@ -37,6 +38,7 @@ class ObjectPart:
     # where each facet's corners lie on `picture`, 0 to 1 from its lower left, (f, 3, 2)
     uv: Floats | None = None
     picture: Bytes | None = None  # (h, w, 3)
+    finish: Finish | None = None  # of its facets, by its material; None: it is matt
     source: str = ""  # what the colours are, for the user; "" where there are none
 
     def moved(self, matrix: Floats) -> "ObjectPart":

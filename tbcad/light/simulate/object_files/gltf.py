@@ -23,11 +23,13 @@ from tbcad.light.simulate.object_files.contents import (
     uri_bytes,
     without_facets,
 )
+from tbcad.light.simulate.object_files.finish import Finish, dielectric_f0
 from tbcad.types import Bytes, Floats, Ints
 
 MAGIC = b"glTF"
 JSON_START = 20  # behind the header of the file and that of its first chunk
 DRACO, GLOSSY = "KHR_draco_mesh_compression", "KHR_materials_pbrSpecularGlossiness"
+UNLIT, IOR, SPECULAR = (f"KHR_materials_{name}" for name in ("unlit", "ior", "specular"))
 TRANSFORM, WEBP = "KHR_texture_transform", "EXT_texture_webp"
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
@@ -210,6 +212,7 @@ def _primitive_part(file: GltfFile, primitive: Json) -> ObjectPart | None:
         raise InputError("its facets name corners that do not exist: it is damaged")
     part = ObjectPart(points, faces, attributes.get("NORMAL"))
     part = _coloured(file, part, primitive.get("material"), attributes)
+    part = replace(part, finish=_finish(file, primitive.get("material"), attributes, part))
     return part if part.normals is not None else part.flat()
 
 
@@ -282,11 +285,43 @@ def _note_left_out(file: GltfFile, material: Json, factor: Floats) -> None:
     file.notes += [note for key, note in LEFT_OUT.items() if key in material]
     if any(value > 0 for value in material.get("emissiveFactor", ())):
         file.notes.append(LEFT_OUT["emissiveTexture"])
-    if "metallicRoughnessTexture" in material.get("pbrMetallicRoughness", {}):
-        file.notes.append("its metallic and roughness map is left out: it is matt")
     mode = material.get("alphaMode", "OPAQUE")
     if mode == "MASK" or (mode != "OPAQUE" and factor[3] < 1):
         file.notes.append("its transparency is left out")
+
+
+def _finish(
+    file: GltfFile, number: int | None, attributes: dict[str, Floats], part: ObjectPart
+) -> Finish | None:
+    """How a part shines; what its material does not say is rough metal (3.9.2)."""
+    material = {} if number is None else file.document["materials"][number]
+    more, facets = material.get("extensions", {}), len(part.faces)
+    if number is None or UNLIT in more:
+        return None
+    base, old = material.get("pbrMetallicRoughness", {}), more.get(GLOSSY)
+    if old is not None and not base:
+        roughness = 1 - float(old.get("glossinessFactor", 1))
+        return Finish.even(facets, roughness, 0.0, old.get("specularFactor", (1, 1, 1)))
+    f0 = dielectric_f0(float(more.get(IOR, {}).get("ior", 1.5)))
+    told = more.get(SPECULAR, {})
+    tint = np.array(told.get("specularColorFactor", (1, 1, 1)), dtype=np.float64)
+    shares = np.minimum(f0 * tint, 1) * float(told.get("specularFactor", 1))
+    map_of = _roughness_and_metal(file, base.get("metallicRoughnessTexture"), attributes, part)
+    rough, metal = (float(base.get(f"{name}Factor", 1)) for name in ("roughness", "metallic"))
+    return Finish.even(facets, rough * map_of[:, 0], metal * map_of[:, 1], shares)
+
+
+def _roughness_and_metal(
+    file: GltfFile, reference: Json | None, attributes: dict[str, Floats], part: ObjectPart
+) -> Floats:
+    """What a map says at the middle of each facet, (f, 2): its green and its blue; 1 without."""
+    picture = None if reference is None else _picture(file, reference, np.ones(3))
+    uv = None if picture is None else _coordinates(file, reference or {}, attributes, part)
+    if picture is None or uv is None:
+        return np.ones((len(part.faces), 2))
+    size = np.array(picture.shape[1::-1])
+    column, row = (np.floor(uv.mean(axis=1) * [1, -1] % 1 * size).astype(int) % size).T
+    return np.asarray(picture[row, column, 1:] / 255)
 
 
 def _picture(file: GltfFile, reference: Json, factor: Floats) -> Bytes | None:

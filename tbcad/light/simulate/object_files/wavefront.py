@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +21,7 @@ from tbcad.light.simulate.object_files.contents import (
     triangles,
     without_facets,
 )
+from tbcad.light.simulate.object_files.finish import Finish, phong_finish
 from tbcad.types import Floats, Ints
 
 OPTIONS = re.compile(r"((?:-[a-z]+(?:\s+(?:on|off|[-+.\de]+|[rgbmlz]))+\s+)*)(.*)", re.IGNORECASE)
@@ -33,10 +34,24 @@ LEFT_OUT = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "s
 
 @dataclass
 class _Material:
-    """A material: its colour, and the file of its picture."""
+    """A material: its colour, the file of its picture, and how it shines."""
 
     colour: list[float] | None = None
     picture: str | None = None
+    specular: list[float] | None = None
+    numbers: dict[str, float] = field(
+        default_factory=dict
+    )  # Ns, Pr, Pm and illum, in small letters
+
+    def finish(self, facets: int) -> Finish | None:
+        """How facets shine: by Pr and Pm, else by Ns and Ks; None: matt, as illum 0 and 1 say."""
+        told = self.numbers
+        if told.keys() & {"pr", "pm"}:
+            return Finish.even(facets, told.get("pr", 1.0), told.get("pm", 0.0))
+        shines = self.specular is not None and max(self.specular) > 0 and "ns" in told
+        if not shines or self.specular is None or told.get("illum", 2) < 2:
+            return None
+        return phong_finish(facets, told["ns"], self.specular)
 
 
 class _Facets(NamedTuple):
@@ -129,6 +144,7 @@ def _painted(
     path: Path, part: ObjectPart, uv: Floats | None, material: _Material, notes: list[str]
 ) -> ObjectPart:
     """The part with its texture, else colours of its corners, else its material's."""
+    part = replace(part, finish=material.finish(len(part.faces)))
     if not part.source and material.colour is not None:
         colours = even(material.colour, len(part.faces))
         part = replace(part, colours=colours, source="colours of materials (Kd)")
@@ -169,7 +185,11 @@ def _read_materials(file: Path, found: dict[str, _Material], notes: list[str]) -
             case "newmtl":
                 material = found.setdefault(rest, _Material())
             case "kd":
-                material.colour = _colour(rest, notes)
+                material.colour = _colour("Kd", rest, notes)
+            case "ks":
+                material.specular = _colour("Ks", rest, notes)
+            case "ns" | "pr" | "pm" | "illum":
+                material.numbers |= dict(zip([key], _numbers(rest), strict=False))
             case "map_kd" if rest and (match := OPTIONS.fullmatch(rest)):
                 material.picture = match[2].strip()
                 if match[1]:
@@ -192,11 +212,11 @@ def _numbers(text: str) -> list[float]:
         return []
 
 
-def _colour(text: str, notes: list[str]) -> list[float] | None:
+def _colour(name: str, text: str, notes: list[str]) -> list[float] | None:
     """Red, green and blue; one number is grey."""
     numbers = _numbers(text)
     numbers = numbers * 3 if len(numbers) == 1 else numbers
     if len(numbers) != 3 or not all(0 <= number <= 1 + ROUNDING for number in numbers):
-        notes.append(f"its colour Kd {text:.40} is not understood: allowed are three of 0 to 1")
+        notes.append(f"its colour {name} {text:.40} is not understood: allowed are three of 0 to 1")
         return None
     return [min(number, 1.0) for number in numbers]

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tbcad.common.compiled import compiled_loop
 from tbcad.core.geometry.loop_vectors import dot as loop_dot
@@ -17,6 +18,7 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.geometry.vectors import unit as unit_rows
 from tbcad.core.optics.lamp_light import RectangularLamps, lambertian
 from tbcad.core.optics.mirror_light import Lamps, direct_light
+from tbcad.light.simulate.object_files.finish import NO_DIELECTRIC, Finish
 from tbcad.light.simulate.scene.lamps import EXPOSED, free_rays
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.types import Bools, Floats, Ints
@@ -30,7 +32,9 @@ SKY_RAYS = 96  # directions by which it is found how much of the mirrors' light 
 # Cosine below which light that falls along a surface is taken as falling at it: between corners it
 # is not known better.
 GRAZING = 0.1
-F0 = 0.04  # share that a dielectric of index 1.5 reflects at normal incidence
+# Of a lamp's area over its squared distance, what is added to alpha^2: the lobe of a perfect mirror
+# is then as high as that of a disc which sends light evenly from the lamp.
+WIDER = 1 / (4 * np.pi)
 
 Lit = Callable[[Floats, Floats], Floats]
 """Light (n,) without shadows on points (n, 3) with unit normals (n, 3)."""
@@ -42,31 +46,34 @@ class Source:
 
     place: Floats  # mm, (3,)
     light: Lit
-    lamp: int  # number of the lamp that it is of
+    area: float = 0.0  # of its face, mm^2
 
 
 @dataclass(frozen=True)
 class CastLight:
     """Light at corners (v,), outside and behind, as shares of what is shown as white."""
 
-    lamp: Floats  # of each of l lamps, (v, 2, l)
+    lamp: NDArray[np.float32]  # of each of l sources, (v, 2, l)
     rest: Floats  # of all that is no lamp, (v, 2)
-    place: Floats  # middles of the lamps, mm, (l, 3)
+    place: Floats  # of the sources, mm, (l, 3)
+    area: Floats  # of their faces, mm^2, (l,)
 
     @property
     def total(self) -> Floats:
         """All of it, (v, 2)."""
-        return np.asarray(self.lamp.sum(axis=2) + self.rest)
+        return np.asarray(self.lamp.sum(axis=2, dtype=np.float64) + self.rest)
 
 
 def lamp_sources(lamps: RectangularLamps) -> list[Source]:
     """The tiles of a prototype's lamps, and its LEDs above, lux."""
     places, facing, candela = lamps.sources()
     tiles, count = len(places) - len(lamps.leds), len(lamps.places)
-    number = [*np.repeat(range(count), tiles // count), *range(count, count + len(lamps.leds))]
+    tile = lamps.width * lamps.length * count / tiles
+    area = np.repeat([tile, 0.0], [tiles, len(lamps.leds)]).tolist()
     each = zip(places[:, None], facing[:, None], candela[:, None], strict=True)
     return [
-        Source(one[0][0], partial(lambertian, *one), k) for one, k in zip(each, number, strict=True)
+        Source(one[0][0], partial(lambertian, *one), size)
+        for one, size in zip(each, area, strict=True)
     ]
 
 
@@ -76,7 +83,7 @@ def led_sources(lamps: Lamps) -> list[Source]:
         Lamps(*(values[k : k + 1] for values in (lamps.places, lamps.normals, lamps.candela)))
         for k in range(len(lamps.places))
     ]
-    return [Source(one.places[0], partial(direct_light, one), k) for k, one in enumerate(single)]
+    return [Source(one.places[0], partial(direct_light, one)) for one in single]
 
 
 def direction_sources(directions: Floats, weights: Floats) -> list[Source]:
@@ -86,7 +93,7 @@ def direction_sources(directions: Floats, weights: Floats) -> list[Source]:
         return lambda _, normals: weight * np.maximum(normals @ way, 0.0)
 
     pairs = zip(directions, weights.tolist(), strict=True)
-    return [Source(FAR_MM * way, light(way, w), k) for k, (way, w) in enumerate(pairs)]
+    return [Source(FAR_MM * way, light(way, w)) for way, w in pairs]
 
 
 def cast_light(
@@ -96,24 +103,23 @@ def cast_light(
 
     `rest` is light of no lamp. `white`: what is shown as white; None: that of a good exposure.
     """
-    lamps = 1 + max(source.lamp for source in sources)
-    light = np.zeros((len(subject.points), 2, lamps))
+    light = np.zeros((len(subject.points), 2, len(sources)), dtype=np.float32)
     even = np.zeros((len(subject.points), 2))
     for side, sign in enumerate((1.0, -1.0)):
         normals = sign * subject.normals
         start = subject.points + LIFT_MM * normals
-        for source in sources:
+        for k, source in enumerate(sources):
             own = source.light(subject.points, normals)
             own[own > 0] *= unhidden(embree, start[own > 0], source.place)
-            light[:, side, source.lamp] += own
+            light[:, side, k] = own
         even[:, side] = rest(subject.points, normals)
     if white is None:
-        front, back = np.percentile(light.sum(axis=2) + even, EXPOSED, axis=0)
+        whole = light.sum(axis=2, dtype=np.float64) + even
+        front, back = np.percentile(whole, EXPOSED, axis=0)
         white = float(front or back) or 1.0
-    which = np.array([source.lamp for source in sources])
     places = np.array([source.place for source in sources])
-    middles = np.array([places[which == k].mean(axis=0) for k in range(lamps)])
-    return CastLight(light / white, even / white, middles)
+    area = np.array([source.area for source in sources])
+    return CastLight(light / np.float32(white), even / white, places, area)
 
 
 def unhidden(embree: Any, start: Floats, place: Floats) -> Bools:
@@ -148,29 +154,27 @@ def cut_small(subject: SceneObject, side_mm: float = SHADOW_MM) -> SceneObject:
         return subject
     if (most := (parts**2).sum()) > max(MOST_FACETS, 2 * len(parts)):
         parts = np.maximum(np.floor(parts * np.sqrt(MOST_FACETS / most)), 1)
-    pieces = [
-        _pieces(subject, np.flatnonzero(parts == count), int(count)) for count in np.unique(parts)
-    ]
-    points, normals, albedo, *rest = (
-        np.concatenate(values) for values in zip(*pieces, strict=True)
-    )
+    alike = [(np.flatnonzero(parts == count), int(count)) for count in np.unique(parts)]
+    pieces = [_pieces(subject, *one) for one in alike]
+    points, normals, albedo, *uv = (np.concatenate(values) for values in zip(*pieces, strict=True))
+    facet = np.concatenate([np.repeat(own, count**2) for own, count in alike])
     # Corners that pieces share are lit once.
     place = np.rint(np.column_stack([points, normals]) / SAME).astype(np.int64)
     _, first, number = np.unique(place, axis=0, return_index=True, return_inverse=True)
-    uv, tiles = rest if rest else (subject.uv, subject.tiles)
     return replace(
         subject,
         points=points[first],
         faces=number.reshape(-1, 3),
         normals=normals[first],
         albedo=albedo,
-        uv=uv,
-        tiles=tiles,
+        uv=uv[0] if uv else None,
+        tiles=None if subject.tiles is None else subject.tiles[facet],
+        finish=subject.finish and subject.finish.of(facet),
     )
 
 
 def _pieces(subject: SceneObject, facets: Ints, count: int) -> list[Floats]:
-    """Points, normals, albedo, and uv with tiles, of facets that are cut into count^2 each."""
+    """Points, normals, albedo, and uv, of facets that are cut into count^2 each."""
     weight = _lattice(count)  # (s, 3, 3): corners of pieces by corners of the facet
 
     def spread(values: Floats) -> Floats:
@@ -180,9 +184,7 @@ def _pieces(subject: SceneObject, facets: Ints, count: int) -> list[Floats]:
     own = subject.faces[facets]
     normals = unit_rows(spread(subject.normals[own]).reshape(-1, 3))
     found = [spread(subject.points[own]).reshape(-1, 3), normals, spread(subject.albedo[facets])]
-    if subject.uv is not None and subject.tiles is not None:
-        found += [spread(subject.uv[facets]), np.repeat(subject.tiles[facets], count**2, axis=0)]
-    return found
+    return found if subject.uv is None else [*found, spread(subject.uv[facets])]
 
 
 def _lattice(count: int) -> Floats:
@@ -201,58 +203,87 @@ def _lattice(count: int) -> Floats:
 class Gloss:
     """How a glossy object reflects its lamps: microfacets after GGX, by Smith's shadowing.
 
-    Source: B. Walter and others, Microfacet Models for Refraction, EGSR 2007; Fresnel's share after
-    C. Schlick, Computer Graphics Forum 13, 1994; alpha is the square of the roughness, as in glTF.
+    Source: B. Walter and others, Microfacet Models for Refraction, EGSR 2007; alpha is the square
+    of the roughness, as in glTF. Dielectrics reflect by Fresnel's equations, metals by C. Schlick,
+    Computer Graphics Forum 13, 1994, which lacks up to a fifth of a dielectric's.
     """
 
     light: CastLight
-    roughness: float  # 0.05 to 1
-    f0: float = F0  # share reflected at normal incidence
+    finish: Finish  # of the object's facets
 
     def highlights(
-        self, corners: Ints, behind: Bools, weight: Floats, spots: tuple[Floats, Floats, Floats]
+        self,
+        facet: Ints,
+        corners: Ints,
+        behind: Bools,
+        spots: tuple[Floats, Floats, Floats, Floats],
+        f0: Floats,
     ) -> Floats:
-        """Light (k,) that goes back along rays from spots on facets with corners (k, 3).
+        """Light (k, 3) that goes back along rays from spots on facets (k,) with corners (k, 3).
 
-        `behind` and `weight` as of SurfaceHits; spots: places, unit normals, and directions of the
-        rays, (k, 3) each. 1 is that of a matt white surface in full light.
+        `behind` as of SurfaceHits; spots: barycentric weights, places, unit normals, and directions
+        of the rays, (k, 3) each; `f0`: shares (k, 3) reflected at normal incidence. 1 is that of a
+        matt white surface in full light.
         """
-        side = behind.astype(np.int64)
-        light = np.einsum("nk,nkl->nl", weight, self.light.lamp[corners, side])
-        alpha = self.roughness**2
-        return np.asarray(_highlights(*spots, light, self.light.place, alpha**2, self.f0))
+        own, one = self.finish.of(facet), self.light
+        lamps = one.lamp, one.place, one.area
+        surface = corners, behind.astype(np.int64), own.roughness**4, own.index
+        part = _highlights(spots, surface, lamps)
+        return np.asarray(part[:, :1] * f0 + part[:, 1:] * (1 - f0))
 
 
 @compiled_loop
 def _highlights(
-    place: Floats,
-    normal: Floats,
-    ray: Floats,
-    light: Floats,
-    lamp: Floats,
-    alpha2: float,
-    f0: float,
+    spots: tuple[Floats, Floats, Floats, Floats],
+    surface: tuple[Ints, Ints, Floats, Floats],
+    lamps: tuple[NDArray[np.float32], Floats, Floats],
 ) -> Floats:
-    total = np.zeros(len(place))
+    """What is to be multiplied by F0, and by 1 - F0, (k, 2). Lamps of an area widen the lobe."""
+    weight, place, normal, ray = spots
+    corners, behind, alpha2, index = surface
+    light, lamp, area = lamps
+    total = np.zeros((len(place), 2))
     for k in range(len(place)):
         point, upward, back = vector(place[k]), vector(normal[k]), vector(ray[k])
         sees = -loop_dot(back, upward)
-        if sees <= 0:
+        if sees <= 0 or not alpha2[k] >= 0:  # NaN: matt
             continue
         for j in range(len(lamp)):
-            if light[k, j] <= 0:
+            own = 0.0
+            for i in range(3):
+                own += weight[k, i] * light[corners[k, i], behind[k, i], j]
+            if own <= 0:
                 continue
-            way = unit(minus(vector(lamp[j]), point))
+            toward = minus(vector(lamp[j]), point)
+            way = unit(toward)
             falls = loop_dot(way, upward)
             if falls <= 0:
                 continue
+            a2 = alpha2[k] + WIDER * area[j] / loop_dot(toward, toward)
             half = unit(plus_scaled(way, -1.0, back))
             up, along = loop_dot(half, upward), -loop_dot(half, back)
-            spread = alpha2 / (up * up * (alpha2 - 1) + 1) ** 2  # of the normals, times pi
+            spread = a2 / (up * up * (a2 - 1) + 1) ** 2  # of the normals, times pi
             falls = max(falls, GRAZING)
             smith = 0.5 / (
-                falls * np.sqrt(sees * sees * (1 - alpha2) + alpha2)
-                + sees * np.sqrt(falls * falls * (1 - alpha2) + alpha2)
+                falls * np.sqrt(sees * sees * (1 - a2) + a2)
+                + sees * np.sqrt(falls * falls * (1 - a2) + a2)
             )
-            total[k] += light[k, j] * spread * smith * (f0 + (1 - f0) * (1 - along) ** 5)
+            total[k, 0] += own * spread * smith
+            total[k, 1] += own * spread * smith * _fresnel_rise(along, index[k])
     return total
+
+
+@compiled_loop
+def _fresnel_rise(cosine: float, index: float) -> float:
+    """How far reflection has risen from that at normal incidence, 0, to 1, as at grazing.
+
+    Of a dielectric of an index by Fresnel's equations, unpolarised; without one by Schlick.
+    """
+    if index >= NO_DIELECTRIC:
+        return (1 - cosine) ** 5
+    inner = np.sqrt(index * index - 1 + cosine * cosine)
+    across = (cosine - inner) / (cosine + inner)
+    along = (index * index * cosine - inner) / (index * index * cosine + inner)
+    normal = ((index - 1) / (index + 1)) ** 2
+    rise: float = ((across * across + along * along) / 2 - normal) / (1 - normal)
+    return rise

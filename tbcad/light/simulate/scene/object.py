@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tbcad.core.geometry.vectors import unit
+from tbcad.light.simulate.object_files.finish import Finish
 from tbcad.types import Bytes, Floats, Ints
 
 GREY = 0.8
@@ -22,10 +23,12 @@ class Reading:
     up: str
     colours: str
     left_out: tuple[str, ...] = ()
+    gloss: str = ""  # that of its materials, for --optics real; "" where it is matt
 
     def line(self, name: str) -> str:
         """One line for the user."""
-        return f"{name}: unit {self.unit}, {self.up} up, colours: {self.colours}"
+        gloss = f", gloss in real optics: {self.gloss}" if self.gloss else ""
+        return f"{name}: unit {self.unit}, {self.up} up, colours: {self.colours}{gloss}"
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class SceneObject:
     # on each corner, 0 to 1, on the side of the normal and behind it, (v, 2); None for the built-in
     # light
     light: Floats | None = None
+    finish: Finish | None = None  # by its materials; None: it is matt
     reading: Reading | None = None  # how its file was taken; None without a file
 
     @property

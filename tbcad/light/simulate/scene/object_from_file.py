@@ -20,6 +20,7 @@ from tbcad.light.simulate.object_files.contents import (
     even,
     without_facets,
 )
+from tbcad.light.simulate.object_files.finish import Finish, joined
 from tbcad.light.simulate.object_files.normals import (
     corner_normals,
     first_of_each,
@@ -94,7 +95,9 @@ def load_object(
         points = np.asarray((points - middle) * (capture_mm / 2 / reach))
     _check_size(path, points, capture_mm, unit)
     colours, notes = _painted(path, mesh, found, asked.paint)
-    reading = Reading(unit, up, colours.pop("text"), tuple(notes))
+    finish = colours.get("finish")
+    gloss = "" if finish is None else finish.text()
+    reading = Reading(unit, up, colours.pop("text"), tuple(notes), gloss)
     if notes:
         _warn(f"{path.name}: {'; '.join(notes)}")
     if told is not None:
@@ -215,7 +218,15 @@ def _painted(
                      "colour and are grey")  # fmt: skip
     text = ", ".join(sources[:4]) + (f" and {len(sources) - 4} more" if len(sources) > 4 else "")
     albedo = mesh.corners([_shares(part) for part in found.parts])
-    return {"albedo": albedo, "text": text, **_textures(path, mesh, found.parts)}, notes
+    shows = {"finish": _finish(mesh, found.parts), **_textures(path, mesh, found.parts)}
+    return {"albedo": albedo, "text": text, **shows}, notes
+
+
+def _finish(mesh: _Mesh, parts: Sequence[ObjectPart]) -> Finish | None:
+    """How facets shine; None: all are matt."""
+    if all(part.finish is None for part in parts):
+        return None
+    return joined([part.finish or Finish.even(len(part.faces)) for part in parts]).of(mesh.facet)
 
 
 def _shares(part: ObjectPart) -> Floats:

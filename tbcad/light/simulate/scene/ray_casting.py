@@ -39,7 +39,7 @@ class Scene:
     gloss: float = 0.0
     # in place of all that light, with cast shadows; None: as `shade` says
     lamps: PointLights | None = None
-    # highlights of lamps in the object's microfacets, besides; None: it is matt
+    # how its microfacets reflect lamps; None: it is matt
     microfacets: Gloss | None = None
     # facets of black bodies before it, as an Embree scene; None: nothing is before it
     screen: Any | None = None
@@ -141,12 +141,21 @@ class SurfaceHits:
         met: Floats = np.where(behind, corners[..., 1], corners[..., 0])
         return np.asarray((met * self.weight).sum(axis=1))
 
-    def highlights(self, subject: SceneObject, gloss: Gloss) -> Floats:
-        """Light (k,) of lamps in microfacets that goes back along the rays."""
+    def glossy(self, subject: SceneObject, shade: Floats, gloss: Gloss) -> Floats:
+        """Light (k, 3) that goes back along the rays, also off microfacets.
+
+        Metals reflect lamps in highlights alone, and light of no lamp as if they were matt.
+        """
+        albedo, light = self.albedo(subject), self.light(subject, shade)[:, None]
+        metal, f0 = gloss.finish.metal[self.facet, None], gloss.finish.f0[self.facet]
+        if metal.any():
+            light = light - metal * (light - self.light(subject, gloss.light.rest)[:, None])
         spots = self.spots(subject)
         behind = self.behind(subject, spots.facet_normal)
-        at = spots.place, spots.normal, self.direction
-        return gloss.highlights(subject.faces[self.facet], behind, self.weight, at)
+        at = self.weight, spots.place, spots.normal, self.direction
+        corners = subject.faces[self.facet]
+        f0 = f0 + metal * (albedo - f0)
+        return np.asarray(albedo * light + gloss.highlights(self.facet, corners, behind, at, f0))
 
 
 def surface_hits(scene: Scene, origin: Floats, direction: Floats) -> SurfaceHits:
@@ -170,14 +179,12 @@ def cast_rays(scene: Scene, origin: Floats, direction: Floats) -> RayHits:
     depth = np.full(len(origin), np.inf)
     hits = surface_hits(scene, origin, direction)
     depth[hits.rows] = hits.depth
-    colour[hits.rows] = 255 * (hits.albedo(scene.subject) * _light(scene, hits))
+    colour[hits.rows] = 255 * _reflected(scene, hits)
     if scene.gloss and scene.lamps is None:
         # Source: B. T. Phong, Communications of the ACM 18(6), 1975.
         mirrored = reflect(hits.direction, hits.normals(scene.subject))
         glint = scene.gloss * (np.maximum(mirrored @ LAMPS.T, 0) ** GLOSS_EXPONENT @ LAMP_LIGHT)
         colour[hits.rows] = np.minimum(colour[hits.rows] + 255 * glint[:, None], 255)
-    if scene.microfacets is not None:
-        colour[hits.rows] += 255 * hits.highlights(scene.subject, scene.microfacets)[:, None]
     if scene.screen is not None and len(origin):
         _put_before(scene.screen, origin, direction, colour, depth)
     return RayHits(colour, depth)
@@ -196,6 +203,13 @@ def distances_to(embree: Any, origin: Floats, direction: Floats) -> Floats:
     """Distances (n,) along rays (n, 3) to the facets of an Embree scene; infinite without one."""
     hits = embree.run(origin.astype(np.float32), direction.astype(np.float32), output=1)
     return np.where(hits["primID"] >= 0, hits["tfar"].astype(np.float64), np.inf)
+
+
+def _reflected(scene: Scene, hits: SurfaceHits) -> Floats:
+    """Light (k, 3) that goes back along the rays."""
+    if scene.microfacets is not None:
+        return hits.glossy(scene.subject, scene.shade, scene.microfacets)
+    return hits.albedo(scene.subject) * _light(scene, hits)
 
 
 def _light(scene: Scene, hits: SurfaceHits) -> Floats:

@@ -6,6 +6,7 @@ import numpy as np
 
 from tbcad.core.optics.lamp_light import RectangularLamps
 from tbcad.core.optics.mirror_light import Lamps
+from tbcad.light.simulate.object_files.finish import Finish
 from tbcad.light.simulate.scene.cast_light import (
     Gloss,
     Lit,
@@ -43,9 +44,9 @@ def real_scene(
 ) -> Scene:
     """An object in the light of a prototype's lamps, of a shell's, or in the built-in light: None.
 
-    `gloss`: its roughness; None: it is matt. Shadows are those of lamps. Of the light by a shell's
-    mirrors a surface gets the share that comes from virtual cameras which the object does not hide;
-    the built-in sky casts none.
+    `gloss`: its roughness; None: as its materials say, which of most files are matt. Shadows are
+    those of lamps. Of the light by a shell's mirrors a surface gets the share that comes from
+    virtual cameras which the object does not hide; the built-in sky casts none.
     """
     small = cut_small(subject)
     embree = embree_scene(small.points, small.faces)
@@ -63,7 +64,8 @@ def real_scene(
         sources, rest = led_sources(lamps), hidden_in_part
     light = cast_light(embree, small, sources, rest, None if lamps else 1.0)
     lit = replace(small, light=light.total)
-    glossy = None if gloss is None else Gloss(light, gloss)
+    finish = small.finish if gloss is None else Finish.even(len(small.faces), gloss)
+    glossy = None if finish is None else Gloss(light, finish)
     return Scene(lit, embree, light.total, small.radius, microfacets=glossy)
 
 

@@ -1,16 +1,22 @@
 """Cast shadows and highlights against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tbcad.core.geometry.vectors import facet_vectors, norm
+from tbcad.core.optics import lamp_light
+from tbcad.core.optics.lamp_light import RectangularLamps
+from tbcad.light.simulate.object_files.finish import F0, Finish
 from tbcad.light.simulate.scene.cast_light import (
-    F0,
     CastLight,
     Gloss,
+    Source,
     cast_light,
     cut_small,
     direction_sources,
+    lamp_sources,
     open_share,
 )
 from tbcad.light.simulate.scene.object import SceneObject
@@ -73,7 +79,7 @@ def test_open_share_of_the_sky() -> None:
 def test_highlight_where_a_mirror_would_show_the_lamp() -> None:
     """There it is E F0 / (4 alpha^2), with lamp and eye along the normal; off it far less."""
     small, light = lit(UP)
-    gloss = Gloss(light, 0.3)
+    gloss = Gloss(light, Finish.even(len(small.faces), 0.3))
     scene = Scene(
         small, embree_scene(small.points, small.faces), light.total, 30.0, 0.0, None, gloss
     )
@@ -84,3 +90,59 @@ def test_highlight_where_a_mirror_would_show_the_lamp() -> None:
     highlight = np.subtract(*seen)
     assert highlight[0] == pytest.approx(F0 / (4 * 0.3**4), rel=1e-3)
     assert 0 < highlight[1] < 0.02 * highlight[0]
+
+
+def shiny(finish: Finish, sources: list[Source], white: float = 1.0) -> Scene:
+    """A plate of 40 mm that faces upward, with no light but that of lamps."""
+    square = np.array([[-20.0, -20, 0], [20, -20, 0], [20, 20, 0], [-20, 20, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    colours = np.broadcast_to([0.9, 0.6, 0.3], (2, 3, 3))
+    plate = cut_small(
+        SceneObject("plate", square, faces, np.tile(UP, (4, 1)), colours, finish=finish)
+    )
+    embree = embree_scene(plate.points, plate.faces)
+    light = cast_light(embree, plate, sources, lambda points, _: 0 * points[:, 0], white)
+    return Scene(plate, embree, light.total, 30.0, microfacets=Gloss(light, plate.finish))
+
+
+def test_a_dielectric_reflects_by_fresnel_and_a_metal_its_colour() -> None:
+    """At 60 degrees an index of 1.5 reflects 8.92 %, 0.04 + 0.96 / 2^5 = 7 % by Schlick."""
+    way = np.array([np.sqrt(3) / 2, 0, 0.5])
+    eye = np.array([[-30 * way[0], 0.0, 15.0]]), np.array([[way[0], 0.0, -0.5]])
+    sources, rough = direction_sources(way[None], np.ones(1)), 0.5
+    matt, glass, metal = (
+        cast_rays(shiny(finish, sources), *eye).colour[0] / 255
+        for finish in (
+            Finish.even(2),
+            Finish.even(2, rough),
+            Finish.even(2, rough, 1.0),
+        )
+    )
+    assert matt == pytest.approx(0.5 * np.array([0.9, 0.6, 0.3]))
+    # E D V pi F, with D pi = 1 / alpha^2 and V by Smith at 60 degrees on both sides.
+    alpha2 = rough**4
+    whole = 0.5 / alpha2 * 0.5 / (2 * 0.5 * np.sqrt(0.25 * (1 - alpha2) + alpha2))
+    assert (glass - matt) / whole == pytest.approx(0.0892, rel=2e-3)
+    colour = np.array([0.9, 0.6, 0.3])
+    assert metal / whole == pytest.approx(colour + (1 - colour) / 32, rel=2e-3)
+
+
+def test_a_lamp_is_seen_as_large_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Against 1,000 points of its face; its middle alone has a highlight of half the width."""
+    lamps = RectangularLamps(np.array([[0.0, 100, 60]]), np.array([[0.0, -1, 0]]), 16, 50, 100)
+    y = np.linspace(-15, 15, 13)
+    start = np.column_stack([0 * y, y, 0 * y])
+    back = np.array([0.0, -100, 60]) - start
+    back /= norm(back)[:, None]
+
+    def shown(sources: list[Source]) -> Floats:
+        glossy, matt = (
+            cast_rays(shiny(finish, sources, 1e6), start + 40 * back, -back).colour[:, 0]
+            for finish in (Finish.even(2, 0.3), Finish.even(2))
+        )
+        return np.asarray(glossy - matt)
+
+    tiles = shown(lamp_sources(lamps))
+    monkeypatch.setattr(lamp_light, "TILES", (20, 50))
+    exact = shown([replace(one, area=0.0) for one in lamp_sources(lamps)])
+    assert tiles == pytest.approx(exact, rel=0.03)
