@@ -71,7 +71,7 @@ class Setup:
             turned,
             [sag_motion(turned, self.plan.body_centre, one[stop]) for one in gravity.sag],
             errors,
-            np.where(is_cap(self.plan), norm(self.plan.centre - self.plan.body_centre), 0.0),
+            np.where(is_cap(self.plan)[:, None], self.plan.body_centre - self.plan.sag, turned.centre),
             np.array([int(frame.object_turn_deg != 0) for frame in self.frames]),
             math.radians(home.zero_error_deg),
             self.lens is not None,
