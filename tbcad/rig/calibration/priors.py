@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from tbcad.core.optics.sphere_forms import FORM_TERMS, power_slope
 from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.sphere_forms import FORM_TERMS, power_slope
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.parameters import Block, Prior, prior_of
 from tbcad.rig.machine.designed import LED_MM, Motion

@@ -156,9 +156,7 @@ def _balls(plan: Plan, machine: Machine, frames: tuple[Frame, ...], turn: int) -
     if there.forms is None:
         return balls_at_stops(plan, machine.centre, machine.radius, place)
     forms = there.forms_in(stop, np.tile(np.arange(len(plan)), stops)).reshape(stops, len(plan), -1)
-    return balls_at_stops(
-        plan, machine.centre, machine.radius, place, forms, there.forms.outward
-    )
+    return balls_at_stops(plan, machine.centre, machine.radius, place, forms, there.forms.outward)
 
 
 @dataclass(frozen=True)

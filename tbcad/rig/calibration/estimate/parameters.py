@@ -21,7 +21,7 @@ from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation
 
 from tbcad.core.geometry.rotations import rotated
-from tbcad.core.geometry.vectors import norm, perpendicular_axes
+from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.core.optics.sphere_forms import TERM_COUNT, power_slope, powered_radius
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Bools, Floats, Ints
@@ -123,8 +123,8 @@ class Prior:
     @cached_property
     def across_arms(self) -> Floats:
         """Two directions across the arm of each sphere from its seat, (k, 2, 3)."""
-        arm, length = self.arm, norm(self.arm)[:, None]
-        return perpendicular_axes(np.where(length > 0, arm, self.mean.axis) / np.where(length > 0, length, 1))
+        has_arm = norm(self.arm)[:, None] > 0
+        return perpendicular_axes(unit(np.where(has_arm, self.arm, self.mean.axis)))
 
     @property
     def arm(self) -> Floats:
@@ -340,7 +340,9 @@ def turn_slopes(
     wobble = Rotation.from_rotvec(turn).as_matrix()
     tilts = left_jacobian(prior.tilt(values).as_rotvec()) @ prior.across.T
     about = wobble @ machine.axis[:, None]
-    on_base = wobble @ _matrices(machine.axis, machine.angle[frame]) @ prior.tilt(values).as_matrix()
+    on_base = (
+        wobble @ _matrices(machine.axis, machine.angle[frame]) @ prior.tilt(values).as_matrix()
+    )
     return {
         Block.CAP_TILT: on_base @ cap_turns(prior, values)[sphere].swapaxes(1, 2),
         Block.TILT: wobble @ tilts,
