@@ -121,3 +121,25 @@ def test_a_measured_radius_is_one_of_the_cap_about_its_apex() -> None:
     assert prior.sigma[Block.POWER][4] == pytest.approx(0.01 * 8**2 / (2 * 25**2), rel=0.1)
     with pytest.raises(InputError, match=r"16\.0 mm wide"):
         measured(7.0)
+
+
+def test_a_tilted_cap_takes_its_form_along_about_its_seat(prior: Prior) -> None:
+    values = np.zeros(len(prior.free))
+    values[of_block(prior, Block.CAP_TILT)] = 1.0
+    tilted, forms = prior.machine(values), prior.mean.forms
+    assert tilted.forms is not None and forms is not None
+    arm = prior.seat - tilted.centre
+    length = np.linalg.norm(arm, axis=1)
+    assert length == pytest.approx(np.linalg.norm(prior.arm, axis=1))
+    assert arm == pytest.approx(length[:, None] * tilted.forms.outward)
+    assert np.abs(tilted.forms.outward - forms.outward)[4].max() > 1e-3
+
+
+def test_a_camera_is_aimed_by_its_picture(prior: Prior) -> None:
+    """What was in the middle stays where it was, as far as the picture is not distorted."""
+    values = np.zeros(len(prior.free))
+    values[of_block(prior, Block.PRINCIPAL)] = 1.0
+    before, after = prior.mean.camera, prior.machine(values).camera
+    ahead = (before.pinhole + 100 * before.axes[2])[None]
+    assert np.abs(after.principal - before.principal).min() > 10
+    assert after.project(ahead) == pytest.approx(before.project(ahead), abs=0.05)
