@@ -153,22 +153,6 @@ def test_all_that_turns_is_moved_as_weight_moves_the_balls(
     assert after[hit >= 0] == pytest.approx(before[hit >= 0] + 0.5, abs=1e-4)
 
 
-def test_weight_turns_caps_with_their_seats(
-    context: PrototypeContext, measured: MeasuredPrototype
-) -> None:
-    """The centre of a cap's front moves by its arm as well, a ball's with the ball alone."""
-    turn, balls = np.array([2e-3, -1e-3, 3e-3]), context.prototype.balls
-    sag = np.cross(turn, measured.seated.T).T
-    moved = {f"sag_{x}_mm": sag[i] for i, x in enumerate("xyz")}
-    moved |= {f"c{x}": getattr(balls, f"c{x}") + sag[i] for i, x in enumerate("xyz")}
-    record = context.prototype.model_copy(update={"balls": balls.model_copy(update=moved)})
-    turned_by = measured_of(replace(context, prototype=record))
-    arm = measured.centre - measured.body
-    assert norm(arm).max() > 3
-    expected = arm + np.cross(turn, arm.T).T
-    assert turned_by.centre - turned_by.body == pytest.approx(expected, abs=1e-6)
-
-
 def test_pads_are_found_without_the_contacts_being_right(context: PrototypeContext) -> None:
     base = base_of(context)
     recorded = context.prototype

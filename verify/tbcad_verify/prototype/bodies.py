@@ -195,12 +195,8 @@ def measure_prototype(
         # The cap's body lies on the pads, wherever the cap's own file has it.
         centre[:, cap.ball] += cap.front.centre - cap.body.centre
         radius[cap.ball], body_radius[cap.ball] = cap.front.radius, cap.body.radius
-    motion, seated = _motion(body, balls.sag), body
-    # A cap turns with its seat, and the centre of its front with it; a ball's is the seat's.
-    centre = centre + balls.sag + np.cross(motion[3:], (centre - body).T).T
-    moved = _under_weight(context, body, motion)
-    normal = balls.columns("nx", 3)
-    normal = unit(np.where(balls.cap, normal + np.cross(motion[3:], normal.T).T, normal))
+    centre, seated, moved = centre + balls.sag, body, _under_weight(context, body)
+    normal = unit(balls.columns("nx", 3))
     surfaces = Surfaces(centre + radius * normal, normal, 1 / radius)
     bought = drawn.keys() - {*VIEWS, *OWN, *(part.part.name for part in parts)}
     bought = {name for name in bought if not name.startswith("ball_")}
@@ -221,22 +217,17 @@ def measure_prototype(
     )
 
 
-def _motion(body: Floats, sag: Floats) -> Floats:
-    """(6,) shift and small turn that fit displacements of balls best, (3, K) each, mm."""
-    return np.asarray(np.linalg.lstsq(rigid_motions(body.T), sag.T.ravel(), rcond=None)[0])
-
-
-def _under_weight(
-    context: PrototypeContext, body: Floats, motion: Floats
-) -> Callable[[str, Mesh], Mesh]:
-    """How a mesh is moved, by its name: a cap as its ball (3, K) with its seat, all else as one."""
+def _under_weight(context: PrototypeContext, body: Floats) -> Callable[[str, Mesh], Mesh]:
+    """How a mesh is moved, by its name: a cap as its ball, all else as fits balls (3, K) best."""
     balls, parts = context.prototype.balls, context.prototype.parts
-    ball = {part.name: part.ball for part in parts if part.role == "cap"}
+    fitted = np.linalg.lstsq(rigid_motions(body.T), balls.sag.T.ravel(), rcond=None)[0]
+    of_cap = {part.name: balls.sag[:, part.ball] for part in parts if part.role == "cap"}
 
     def moved(name: str, mesh: Mesh) -> Mesh:
-        k = ball.get(name)
-        shift, about = (motion[:3], 0.0) if k is None else (balls.sag[:, k], body[:, k])
-        return replace(mesh, points=mesh.points + shift + np.cross(motion[3:], mesh.points - about))
+        if name in of_cap:
+            return replace(mesh, points=mesh.points + of_cap[name])
+        by = np.cross(fitted[3:], mesh.points) + fitted[:3]
+        return replace(mesh, points=mesh.points + by)
 
     return moved
 
