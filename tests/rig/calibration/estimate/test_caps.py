@@ -127,7 +127,8 @@ def test_a_tilted_cap_takes_its_form_along_about_its_seat(prior: Prior) -> None:
     values = np.zeros(len(prior.free))
     values[of_block(prior, Block.CAP_TILT)] = 1.0
     tilted, forms = prior.machine(values), prior.mean.forms
-    assert tilted.forms is not None and forms is not None
+    assert tilted.forms is not None
+    assert forms is not None
     arm = prior.seat - tilted.centre
     length = np.linalg.norm(arm, axis=1)
     assert length == pytest.approx(np.linalg.norm(prior.arm, axis=1))
