@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from tbcad.core.geometry.vectors import norm
 from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.object import built_in_object
 from tbcad.light.simulate.scene.ray_casting import prepared_scene
@@ -82,5 +81,5 @@ def small_run(
     series = np.array([frame.object_turn_deg // 180 for frame in frames])
     machine = designed.of_frames(kept)
     still = [sag_motion(machine, plan.body_centre, np.zeros((len(kept), len(plan), 3)))]
-    arm = np.where(is_cap(plan), norm(plan.centre - plan.body_centre), 0.0)
-    return Small(run, prototype_prior(machine, still, kinds, arm, series))
+    seat = np.where(is_cap(plan)[:, None], plan.body_centre, machine.centre)
+    return Small(run, prototype_prior(machine, still, kinds, seat, series))

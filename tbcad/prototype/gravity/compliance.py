@@ -140,6 +140,15 @@ def column_compliance(length: float, bending: float, twisting: float) -> Floats:
     return found
 
 
+def best_motions(place: Floats, moved: Floats) -> Floats:
+    """Shifts and small turns about the origin (n, 6) that fit displacements (n, k, 3) best, mm.
+
+    Of places (k, 3).
+    """
+    motion = rigid_motion(place).reshape(-1, 6)
+    return np.asarray(moved.reshape(len(moved), -1) @ np.linalg.pinv(motion).T)
+
+
 def moved_to(compliance: Floats, arm: Floats) -> Floats:
     """The compliance (6, 6) of a place at an arm (3,) from the one it was of."""
     motion = np.eye(6)

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import diags_array
 
-from tbcad.core.geometry.vectors import norm
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
@@ -71,7 +70,9 @@ class Setup:
             turned,
             [sag_motion(turned, self.plan.body_centre, one[stop]) for one in gravity.sag],
             errors,
-            np.where(is_cap(self.plan), norm(self.plan.centre - self.plan.body_centre), 0.0),
+            np.where(
+                is_cap(self.plan)[:, None], self.plan.body_centre - self.plan.sag, turned.centre
+            ),
             np.array([int(frame.object_turn_deg != 0) for frame in self.frames]),
             math.radians(home.zero_error_deg),
             self.lens is not None,

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.sphere_forms import FORM_TERMS, power_slope
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.parameters import Block, Prior, prior_of
@@ -39,7 +40,7 @@ def prototype_prior(
     machine: Machine,
     moved: Sequence[Motion],
     errors: Errors,
-    arm: Floats,
+    seat: Floats,
     series: Ints,
     zero_error: float = 0.0,
     lens_known: bool = False,
@@ -47,25 +48,27 @@ def prototype_prior(
 ) -> Prior:
     """Prior of a prototype as designed, whose balls are on a base that rotates.
 
-    Gravity moves the base in its frames, by the carrier and by what holds it. Caps, which are made
-    instead of purchased, have arms from their bodies' centres to their spheres', mm; balls have 0,
-    (k,). Each frame belongs to a series, (f,). The base's angle zero has a half width in radians.
+    Gravity moves the base in its frames, by the carrier and by what holds it. Seats have the
+    centres of the bodies, mm, (k, 3): of caps, which are made instead of purchased, these are not
+    their spheres'. Each frame belongs to a series, (f,). The base's angle zero has a half width in
+    radians.
     A known lens is fixed; measured radii have numbers of spheres, values and standard deviations,
     mm.
     """
+    cap = norm(machine.centre - seat) > 0
     machine, powers = _powers(machine, errors, measured)
     with_form = 0.0 * powers if machine.forms is None else np.sign(machine.forms.half_aperture)
     balls = [one for one in measured if not with_form[one[0]]]
-    radius, radii = _radii(machine, errors, arm > 0, balls)
-    centres = np.hypot(errors.seat.sigma, arm * errors.cap_tilt.sigma)
+    radius, radii = _radii(machine, errors, cap, balls)
     offset = math.hypot(zero_error / math.sqrt(3), errors.rotation_angle.sigma)
     known = _camera(machine, errors, lens_known) | {
         Block.TILT: errors.axis_tilt.sigma,
         Block.AXIS_POINT: errors.shell_shift.sigma,
         Block.OFFSET: offset,
-        Block.CARRIER: [_growth(errors), errors.shell_shift.sigma],
+        Block.CARRIER: [_growth(errors), *[errors.shell_shift.sigma] * 3],
         Block.LEDS: math.hypot(errors.shell_shift.sigma, LED_MM),
-        Block.CENTRES: centres[:, None],
+        Block.CENTRES: errors.seat.sigma,
+        Block.CAP_TILT: cap[:, None] * errors.cap_tilt.sigma,
         Block.RADII: radii,
         Block.ANGLES: _with_sag(errors.rotation_angle, errors, [one.angle for one in moved]),
         Block.TURN: _with_sag(errors.axis_wobble, errors, [one.turn for one in moved]),
@@ -83,7 +86,7 @@ def prototype_prior(
         shift=share * np.sum([one.shift for one in moved], axis=0),
         sag=share * np.sum([one.sag for one in moved], axis=0),
     )
-    return prior_of(mean, series, known)
+    return prior_of(mean, series, known, seat)
 
 
 def _with_sag(error: Error, errors: Errors, moved: list[Floats]) -> float:
@@ -107,7 +110,7 @@ def shell_prior(machine: Machine, errors: Errors, lens_known: bool = False) -> P
     known = camera | {
         Block.CAMERA_TURN: np.hypot(camera[Block.CAMERA_TURN], errors.shell_tilt.sigma),
         Block.PINHOLE: np.hypot(camera[Block.PINHOLE], shift),
-        Block.CARRIER: [_growth(errors), 0.0],
+        Block.CARRIER: [_growth(errors), 0.0, 0.0, 0.0],
         Block.LEDS: math.hypot(math.hypot(shift, LED_MM), shift),
         Block.CENTRES: centres[:, None],
         Block.RADII: errors.whole_radius.sigma,
@@ -120,19 +123,13 @@ def _growth(errors: Errors) -> float:
 
 
 def _camera(machine: Machine, errors: Errors, lens_known: bool) -> dict[Block, Any]:
-    """Standard deviations of pose and lens.
-
-    A camera whose principal point is off is turned until its picture is in place again.
-    """
-    principal = 0.0 if lens_known else PRINCIPAL_SHARE * machine.camera.width_px
-    tilt = errors.camera_tilt.sigma
-    aimed = math.hypot(tilt, principal / float(machine.camera.focal.mean()))
+    """Standard deviations of pose and lens."""
     known = 0.0 if lens_known else 1.0
     return {
-        Block.CAMERA_TURN: np.array([aimed, aimed, tilt]),
+        Block.CAMERA_TURN: np.full(3, errors.camera_tilt.sigma),
         Block.PINHOLE: errors.camera_shift.sigma,
         Block.FOCAL: known * np.array([errors.camera_focal.sigma, OBLONG]),
-        Block.PRINCIPAL: principal,
+        Block.PRINCIPAL: known * PRINCIPAL_SHARE * machine.camera.width_px,
         Block.DISTORTION: known * np.array(DISTORTIONS),
     }
 

@@ -15,7 +15,7 @@ from tbcad.core.optics.sphere_forms import TERM_COUNT, Forms
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan, PrototypeRun, balls_at_stops, prototype_run
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector
-from tbcad.prototype.gravity.compliance import rigid_motion
+from tbcad.prototype.gravity.compliance import best_motions
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.prototype import NAME, Prototype
 from tbcad.records.run import Frame
@@ -25,6 +25,7 @@ from tbcad.tolerancing.montecarlo.error_kinds import Errors
 from tbcad.tolerancing.prototype.gravity import Gravity
 from tbcad.tolerancing.prototype.windows import (
     PrototypeDraws,
+    cap_rotations,
     draw_prototypes,
     powered_plan,
     tilted_centres,
@@ -155,7 +156,7 @@ def _balls(plan: Plan, machine: Machine, frames: tuple[Frame, ...], turn: int) -
     if there.forms is None:
         return balls_at_stops(plan, machine.centre, machine.radius, place)
     forms = there.forms_in(stop, np.tile(np.arange(len(plan)), stops)).reshape(stops, len(plan), -1)
-    return balls_at_stops(plan, machine.centre, machine.radius, place, forms)
+    return balls_at_stops(plan, machine.centre, machine.radius, place, forms, there.forms.outward)
 
 
 @dataclass(frozen=True)
@@ -198,9 +199,8 @@ def sag_motion(machine: Machine, body: Floats, sag: Floats) -> Motion:
     To first order, for an axis through the origin. Bodies are at (k, 3), mm: the centre of a flat
     cap's sphere is metres behind its body, and moves with the turn as far as its arm is long.
     """
-    rigid = rigid_motion(body).reshape(-1, 6)
-    fitted = sag.reshape(len(sag), -1) @ np.linalg.pinv(rigid).T
-    rest = sag - (fitted @ rigid.T).reshape(sag.shape)
+    fitted = best_motions(body, sag)
+    rest = sag - fitted[:, None, :3] - np.cross(fitted[:, None, 3:], body)
     shift, turn = (
         rotated(one, machine.axis, machine.angle) for one in (fitted[:, :3], fitted[:, 3:])
     )
@@ -221,7 +221,8 @@ def random_build(
     tilt = Rotation.from_rotvec(draws.tilt[0] @ across)
     seats, forms = draws.seat[0], designed_forms(plan)
     if forms is not None:
-        axes = np.stack([tilt.apply(forms.axes[:, i]) for i in (0, 1)], axis=1)
+        turned = tilt * cap_rotations(plan, draws.cap_tilt[0])
+        axes = np.stack([turned.apply(forms.axes[:, i]) for i in (0, 1)], axis=1)
         forms = replace(forms, terms=draws.form[0], axes=axes)
     powered = powered_plan(plan, draws.power[0])
     machine = Machine(

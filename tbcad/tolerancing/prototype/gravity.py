@@ -8,6 +8,7 @@ from tbcad.cad.formats.checked_files import REBUILD
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign
+from tbcad.prototype.gravity.compliance import best_motions
 from tbcad.prototype.gravity.sag import read_sag
 from tbcad.records.tables import BallRow, SagRow, StopRow
 from tbcad.types import Floats
@@ -15,12 +16,15 @@ from tbcad.types import Floats
 
 @dataclass(frozen=True)
 class Gravity:
-    """Turn of the base and displacements of its k balls at t stops."""
+    """Turn of the base, and displacements of its k bodies with their seats' turns, at t stops."""
 
     wind_up: Floats  # by which the base is beyond the plan's angles, radians, (t,)
-    # displacements of balls in the base's frame at angle zero: as the carrier bends, and as what
+    # displacements of bodies in the base's frame at angle zero: as the carrier bends, and as what
     # holds its hub does, mm, (2, t, k, 3)
     sag: Floats
+    # small rotations of the base that these are the best fit of, and caps with their seats follow,
+    # radians, (2, t, 3)
+    turn: Floats
     # on the mean over each ball's pictures: seats are made so much beside the places of their
     # balls, mm, (k, 3)
     mean: Floats
@@ -29,11 +33,16 @@ class Gravity:
         """Displacements with shares (..., 2) of both, mm, (..., t, k, 3)."""
         return np.tensordot(share, self.sag, axes=(-1, 0))
 
+    def turned(self, share: Floats) -> Floats:
+        """Rotations with shares (..., 2) of both, radians, (..., t, 3)."""
+        return np.tensordot(share, self.turn, axes=(-1, 0))
+
 
 def weightless(plan: Plan) -> Gravity:
     """Without gravity, and with seats where the balls are to be."""
     stops, balls = len(plan.angle), len(plan)
-    return Gravity(np.zeros(stops), np.zeros((2, stops, balls, 3)), np.zeros((balls, 3)))
+    sag, turn = np.zeros((2, stops, balls, 3)), np.zeros((2, stops, 3))
+    return Gravity(np.zeros(stops), sag, turn, np.zeros((balls, 3)))
 
 
 def read_gravity(export: ExportedDesign, plan: Plan) -> Gravity:
@@ -60,4 +69,5 @@ def read_gravity(export: ExportedDesign, plan: Plan) -> Gravity:
         return replace(none, wind_up=wind_up)
     carrier = found.of["carrier"]
     sag = np.stack([carrier, found.whole - carrier]) @ found.axes
-    return Gravity(wind_up, sag, plan.sag)
+    turn = np.stack([best_motions(plan.body_centre, one)[:, 3:] for one in sag])
+    return Gravity(wind_up, sag, turn, plan.sag)

@@ -247,8 +247,11 @@ def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: i
     """Camera and balls when each mirror of one run is photographed."""
     run, plan = model.runs[half], model.plan
     powered = powered_plan(plan, draws.power[build])
-    on_base = (tilted_centres(powered, draws.cap_tilt[build]) + draws.seat[build])[run.ball]
-    on_base = on_base + model.gravity.sagged(draws.sag[build])[run.stop, run.ball]
+    arm = (tilted_centres(powered, draws.cap_tilt[build]) - plan.body_centre)[run.ball]
+    by_weight = Rotation.from_rotvec(model.gravity.turned(draws.sag[build])[run.stop])
+    seat = (plan.body_centre + draws.seat[build])[run.ball]
+    seat = seat + model.gravity.sagged(draws.sag[build])[run.stop, run.ball]
+    caps = cap_rotations(plan, draws.cap_tilt[build])[run.ball]
     angle = plan.angle[run.stop] + draws.angle[build, half, run.stop]
     tilt = Rotation.from_rotvec(draws.tilt[build] @ plan.frame[1:])
     runout = draws.runout[build, half, run.stop] @ plan.frame[1:]
@@ -257,11 +260,11 @@ def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: i
     def turned(vectors: Floats) -> Floats:
         return np.asarray(wobble.apply(tilt.apply(rotated(vectors, plan.frame[0], angle))))
 
-    centre = turned(on_base) + runout
+    centre = turned(seat + by_weight.apply(arm)) + runout
     radius = powered.radius[run.ball] + draws.radius[build, run.ball]
     form = form_rows(plan, draws.form[build])[run.ball]
     for start in range(FIRST, PER_MM, 3):
-        form[:, start : start + 3] = turned(form[:, start : start + 3])
+        form[:, start : start + 3] = turned((by_weight * caps).apply(form[:, start : start + 3]))
     pinhole = model.pinhole + draws.camera_shift[build]
     # A longer focal length makes pictures larger: a pixel's ray is nearer to the axis.
     nearer = np.array([[1 / draws.focal[build]], [1 / draws.focal[build]], [1.0]])
@@ -292,8 +295,13 @@ def tilted_centres(plan: Plan, tilt: Floats) -> Floats:
     Tilts are about two axes across the normal, radians, (k, 2). A ball's own is its body's, and
     stays.
     """
-    about = Rotation.from_rotvec(np.einsum("ka,kax->kx", tilt, perpendicular_axes(plan.normal)))
-    return np.asarray(plan.body_centre + about.apply(plan.centre - plan.body_centre))
+    arm = plan.centre - plan.body_centre
+    return np.asarray(plan.body_centre + cap_rotations(plan, tilt).apply(arm))
+
+
+def cap_rotations(plan: Plan, tilt: Floats) -> Rotation:
+    """Of the bodies in their seats by tilts (k, 2): see `tilted_centres`."""
+    return Rotation.from_rotvec(np.einsum("ka,kax->kx", tilt, perpendicular_axes(plan.normal)))
 
 
 def calibrated_pose(model: PrototypeWindows, half: int, pose: RunPose) -> RunPose:

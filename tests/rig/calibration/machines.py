@@ -51,7 +51,18 @@ def small_prior(machine: Machine, process: str = "fdm") -> Prior:
     moved = [
         sag_motion(machine, machine.centre, np.einsum("kxa,fa->fkx", one, down)) for one in bends
     ]
-    return prototype_prior(machine, moved, process_errors(load_process(process)), arm, series)
+    errors = process_errors(load_process(process))
+    return prototype_prior(machine, moved, errors, seats(machine, arm), series)
+
+
+def outward(machine: Machine) -> np.ndarray:
+    """Unit normals at the apices of its spheres, (k, 3)."""
+    return unit(unit(-machine.centre) + unit(PINHOLE - machine.centre))
+
+
+def seats(machine: Machine, arm: np.ndarray) -> np.ndarray:
+    """Centres of bodies in front of their spheres' by arms (k,), mm, (k, 3)."""
+    return machine.centre + arm[:, None] * outward(machine)
 
 
 def drawn(prior: Prior, seed: int) -> tuple[np.ndarray, Machine]:

@@ -71,7 +71,8 @@ def gravity_at(plan: Plan) -> Gravity:
     down = np.stack([np.cos(plan.angle), np.sin(plan.angle)])
     bends = np.random.default_rng(1).normal(0, 0.2, (2, 2, len(plan), 3))
     sag = np.einsum("wt,pwkx->ptkx", down, bends)
-    return Gravity(4e-3 * np.sin(plan.angle), sag, sag.sum(axis=0).mean(axis=0))
+    turn = np.einsum("wt,pwx->ptx", down, np.random.default_rng(3).normal(0, 5e-3, (2, 2, 3)))
+    return Gravity(4e-3 * np.sin(plan.angle), sag, turn, sag.sum(axis=0).mean(axis=0))
 
 
 @pytest.fixture(scope="module")
@@ -127,18 +128,18 @@ def balls(
     """Centre and radius of the ball in each window."""
     frame, centre = model.plan.frame, np.empty((len(run.reflector), 3))
     tilt = Rotation.from_rotvec(draws.tilt[build, 0] * frame[1] + draws.tilt[build, 1] * frame[2])
-    on_base = model.plan.centre + draws.seat[build]
+    seat, arm = model.plan.body_centre + draws.seat[build], np.zeros_like(model.plan.centre)
     for k, (normal, lean) in enumerate(zip(model.plan.normal, draws.cap_tilt[build], strict=True)):
-        body, own = model.plan.body_centre[k], model.plan.centre[k]
         about = Rotation.from_rotvec(lean @ perpendicular_axes(normal))
-        on_base[k] += body + about.apply(own - body) - own
+        arm[k] = about.apply(model.plan.centre[k] - model.plan.body_centre[k])
     for i, (ball, stop) in enumerate(zip(run.ball, run.stop, strict=True)):
         angle = model.plan.angle[stop] + draws.angle[build, half, stop]
         drift = draws.runout[build, half, stop]
         wobble = Rotation.from_rotvec(draws.wobble[build, half, stop] @ frame[1:])
         about = wobble * tilt * Rotation.from_rotvec(angle * frame[0])
         carrier, rest = (draws.sag[build] * model.gravity.sag[:, stop, ball].T).T
-        place = about.apply(on_base[ball] + carrier + rest)
+        bent = Rotation.from_rotvec(draws.sag[build] @ model.gravity.turn[:, stop])
+        place = about.apply(seat[ball] + carrier + rest + bent.apply(arm[ball]))
         centre[i] = place + drift[0] * frame[1] + drift[1] * frame[2]
     return centre, (model.plan.radius + draws.radius[build])[run.ball]
 
@@ -269,7 +270,7 @@ def test_seats_against_weight_bring_balls_to_their_places(
     sag = np.broadcast_to(mean / 2, (2, stops, len(plan), 3))
     results = []
     for seats in (mean, 0 * mean):
-        gravity = Gravity(np.zeros(stops), sag, seats)
+        gravity = Gravity(np.zeros(stops), sag, np.zeros((2, stops, 3)), seats)
         model = prototype_model(reflectors(small_design), plan, gravity)
         draws = draws_of(model, 1, sag=Error(mean=1.0))
         results.append(prototype_result(model, draws).calibrated_coverage.min())

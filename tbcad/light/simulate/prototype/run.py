@@ -297,17 +297,20 @@ def balls_at_stops(
     radius: Floats,
     place: Callable[[Floats], Floats],
     forms: Floats | None = None,
+    normal: Floats | None = None,
 ) -> Floats:
     """Balls as of `PrototypeRun`, (s, k, 8), from spheres (k, 3), (k,) at base angle zero, mm.
 
-    The plan says where the sphere in the seat is, from the reflecting one, and how much larger;
+    The plan says how far the sphere in the seat is before the reflecting one, and how much larger;
     `place` moves points of the base (s, k, 3) from angle zero to the stops. Forms there,
-    (s, k, FORM_COLUMNS), follow the spheres.
+    (s, k, FORM_COLUMNS), follow the spheres. Normals of caps (k, 3) are the plan's, or those of
+    caps that are tilted.
     """
     shape = (len(plan.angle), len(plan))
     # A ball is its own body; of a cap only the front is flatter or steeper, about its apex.
     growth = np.where(plan.body_radius < plan.radius, radius - plan.radius, 0.0)
-    behind = plan.body_centre - plan.centre + growth[:, None] * plan.normal
+    arm = norm(plan.body_centre - plan.centre) + growth
+    behind = arm[:, None] * (plan.normal if normal is None else normal)
     front, body = (
         place(np.broadcast_to(points, (*shape, 3))) for points in (centre, centre + behind)
     )

@@ -32,7 +32,7 @@ from tbcad.rig.calibration.estimate.parameters import (
     Of,
     Prior,
     Slopes,
-    left_jacobian,
+    camera_turns,
     sphere_slopes,
     turn_slopes,
 )
@@ -188,7 +188,7 @@ def light_images(
     pixel, by_image, by_lens = projection(camera, image)
     by_point = by_image @ camera.axes
     moved = sphere_slopes(prior, values, machine, frame, sphere)
-    turned = left_jacobian(prior.blocks(values)[Block.CAMERA_TURN]).T[None]
+    turned, aimed = (one.T[None] for one in camera_turns(prior, values))
     by_logarithm, (x, y) = np.eye(LENS), camera.focal  # of the focal lengths
     by_logarithm[:2, :2] = [[x, x / 2], [y, -y / 2]]
     lens = by_lens @ by_logarithm
@@ -196,14 +196,15 @@ def light_images(
         Block.CAMERA_TURN: by_image @ np.cross(turned, image[:, None]).swapaxes(1, 2),
         Block.PINHOLE: by_point @ (seen.by_pinhole - np.eye(3)),
         Block.FOCAL: lens[:, :, :2],
-        Block.PRINCIPAL: lens[:, :, 2:4],
+        Block.PRINCIPAL: lens[:, :, 2:4]
+        + by_image @ np.cross(aimed, image[:, None]).swapaxes(1, 2),
         Block.DISTORTION: lens[:, :, 4:],
         Block.RADII: by_point @ seen.by_radius[..., None],
         **{block: by_point @ seen.by_centre @ value for block, value in moved.by.items()},
         **{block: by_point @ value for block, value in formed.items()},
     }
     if by_turn is not None:
-        for block, turn in turn_slopes(prior, values, machine, frame).items():
+        for block, turn in turn_slopes(prior, values, machine, frame, sphere).items():
             by[block] = by[block] + by_point @ by_turn @ turn
     if Block.POWER in by:
         growth = prior.radius_by_power(values)[sphere, None, None]

@@ -21,7 +21,7 @@ from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation
 
 from tbcad.core.geometry.rotations import rotated
-from tbcad.core.geometry.vectors import norm, perpendicular_axes
+from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.core.optics.sphere_forms import TERM_COUNT, power_slope, powered_radius
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Bools, Floats, Ints
@@ -60,10 +60,11 @@ class Block(StrEnum):
     TILT = "axis_tilt", Of.MACHINE, 2
     AXIS_POINT = "axis_point", Of.MACHINE, 2  # along both, mm
     OFFSET = "angle_offset", Of.SERIES, 1  # radians
-    # Growth of the spheres' places about the origin, as a share, and shift along the axis, mm.
-    CARRIER = "carrier", Of.MACHINE, 2
+    # Growth of the seats' places about the origin, as a share; shift of all along two directions
+    # across the axis and along it, mm.
+    CARRIER = "carrier", Of.MACHINE, 4
     LEDS = "leds", Of.LED, 3  # mm
-    CENTRES = "centres", Of.SPHERE, 3  # mm
+    CENTRES = "centres", Of.SPHERE, 3  # of the seats, with their spheres, mm
     RADII = "radii", Of.SPHERE, 1  # mm
     ANGLES = "angles", Of.FRAME, 1  # radians
     # Of the base beside its angle, about two directions across the axis through the origin,
@@ -72,8 +73,10 @@ class Block(StrEnum):
     SHIFT = "shift", Of.FRAME, 3
     # By which the spheres' sag is larger than the mean's, as a share.
     SAG = "sag", Of.MACHINE, 1
-    # Of caps: by which sagittas are larger over the part in use, the apex where it is, mm; and the
-    # terms of their forms (tbcad.core.optics.sphere_forms), mm.
+    # Of caps: tilts in their seats about two directions across their arms, radians, which take
+    # spheres and forms along; by which sagittas are larger over the part in use, the apex where it
+    # is, mm; and the terms of their forms (tbcad.core.optics.sphere_forms), mm.
+    CAP_TILT = "cap_tilts", Of.SPHERE, 2
     POWER = "cap_powers", Of.SPHERE, 1
     FORM = "cap_forms", Of.SPHERE, TERM_COUNT
 
@@ -86,6 +89,7 @@ class Prior:
     # number of the series that each frame belongs to, each with an offset of its angles of its own,
     # (f,)
     series: Ints
+    seat: Floats  # centres of the bodies in the seats, which caps tilt about, mm, (k, 3)
     # standard deviations of all blocks, of r series, l LEDs, k spheres or f frames such as (k, 3),
     # of one figure each (k,); zero fixes
     sigma: dict[Block, Floats]
@@ -116,6 +120,17 @@ class Prior:
         """Directions that frames are shifted along: two across the axis, and the axis, (3, 3)."""
         return np.vstack([self.across, self.mean.axis])
 
+    @cached_property
+    def across_arms(self) -> Floats:
+        """Two directions across the arm of each sphere from its seat, (k, 2, 3)."""
+        has_arm = norm(self.arm)[:, None] > 0
+        return perpendicular_axes(unit(np.where(has_arm, self.arm, self.mean.axis)))
+
+    @property
+    def arm(self) -> Floats:
+        """Of the spheres' centres from their seats, mm, (k, 3)."""
+        return self.mean.centre - self.seat
+
     def is_of(self, what: Of) -> Bools:
         """Whether free parameters are of single frames, spheres ..., (q,)."""
         every = [np.full(self.sigma[block].size, block.of == what) for block in Block]
@@ -138,22 +153,47 @@ class Prior:
         """By which the axis is tilted about the origin, with the base and its spheres."""
         return Rotation.from_rotvec(self.blocks(values)[Block.TILT] @ self.across)
 
+    def cap_tilts(self, values: Floats) -> Rotation:
+        """By which spheres are tilted about their seats, on the base before that is tilted."""
+        tilts = self.blocks(values)[Block.CAP_TILT]
+        return Rotation.from_rotvec(np.einsum("ka,kax->kx", tilts, self.across_arms))
+
+    def arms(self, values: Floats) -> Floats:
+        """Arms of spheres that are tilted, mm, (k, 3): an apex stays when the radius grows."""
+        arm, forms = self.arm, self.mean.forms
+        if forms is not None:
+            arm = arm - (self.powered(values) - self.mean.radius)[:, None] * forms.outward
+        return np.asarray(self.cap_tilts(values).apply(arm))
+
+    def aim(self, values: Floats) -> Floats:
+        """Rotation of the camera about its own axes that keeps the picture in place, (3,).
+
+        It is aimed by its picture, so one whose principal point is off is turned against that.
+        """
+        return self.by_principal @ self.blocks(values)[Block.PRINCIPAL]
+
+    @cached_property
+    def by_principal(self) -> Floats:
+        """Derivatives of `aim` by the principal point, radians/px, (3, 2)."""
+        x, y = 1 / self.mean.camera.focal
+        return np.array([[0, y], [-x, 0], [0, 0]])
+
     def machine(self, values: Floats) -> Machine:
         """The machine of free parameters (q,) in prior standard deviations."""
         x, mean = self.blocks(values), self.mean
-        growth, slide = x[Block.CARRIER]
+        growth, *common = x[Block.CARRIER]
         tilt, forms, radius = self.tilt(values), self.mean.forms, self.powered(values)
-        # An apex stays where it is when the radius grows about it.
-        on_base = x[Block.CENTRES]
+        seat = (1 + growth) * self.seat + np.array(common) @ self.ways + x[Block.CENTRES]
         if forms is not None:
-            on_base = on_base - (radius - mean.radius)[:, None] * forms.outward
-            axes = np.stack([tilt.apply(forms.axes[:, i]) for i in (0, 1)], axis=1)
+            turned = tilt * self.cap_tilts(values)
+            axes = np.stack([turned.apply(forms.axes[:, i]) for i in (0, 1)], axis=1)
             forms = replace(forms, axes=axes, terms=forms.terms + x[Block.FORM])
         ratio = x[Block.FOCAL][0] + np.array([0.5, -0.5]) * x[Block.FOCAL][1]
+        turn = Rotation.from_rotvec(x[Block.CAMERA_TURN]) * Rotation.from_rotvec(self.aim(values))
         camera = replace(
             mean.camera,
             pinhole=mean.camera.pinhole + x[Block.PINHOLE],
-            axes=Rotation.from_rotvec(x[Block.CAMERA_TURN]).apply(mean.camera.axes.T).T,
+            axes=turn.as_matrix() @ mean.camera.axes,
             focal=mean.camera.focal * np.exp(ratio),
             principal=mean.camera.principal + x[Block.PRINCIPAL],
             distortion=mean.camera.distortion + x[Block.DISTORTION],
@@ -163,7 +203,7 @@ class Prior:
             axis=tilt.apply(mean.axis),
             axis_point=mean.axis_point + x[Block.AXIS_POINT] @ self.across,
             angle=mean.angle + x[Block.OFFSET][self.series] + x[Block.ANGLES],
-            centre=tilt.apply((1 + growth) * mean.centre + slide * mean.axis + on_base),
+            centre=tilt.apply(seat + self.arms(values)),
             radius=radius + x[Block.RADII],
             leds=mean.leds + x[Block.LEDS],
             turn=_sum(mean.turn, x[Block.TURN] @ self.across),
@@ -190,10 +230,16 @@ def _sum(mean: Floats | None, more: Floats) -> Floats:
     return more if mean is None else mean + more
 
 
-def prior_of(machine: Machine, series: Ints, known: Mapping[Block, ArrayLike]) -> Prior:
+def prior_of(
+    machine: Machine,
+    series: Ints,
+    known: Mapping[Block, ArrayLike],
+    seat: Floats | None = None,
+) -> Prior:
     """A prior by standard deviations, each broadcast to its block; the other blocks are fixed.
 
-    Each frame belongs to a series, (f,).
+    Each frame belongs to a series, (f,). Spheres are their own bodies in the seats, or have seats
+    (k, 3).
     """
     numbers = {
         Of.SERIES: int(series.max()) + 1,
@@ -206,7 +252,7 @@ def prior_of(machine: Machine, series: Ints, known: Mapping[Block, ArrayLike]) -
         size = (block.size,) if block.size > 1 or block.of is Of.MACHINE else ()
         shape = size if block.of is Of.MACHINE else (numbers[block.of], *size)
         sigma[block] = np.broadcast_to(known.get(block, 0.0), shape).astype(np.float64)
-    return Prior(machine, series, sigma)
+    return Prior(machine, series, machine.centre if seat is None else seat, sigma)
 
 
 @dataclass(frozen=True)
@@ -246,7 +292,7 @@ def sphere_slopes(
     rotation = wobble.as_matrix() @ _matrices(machine.axis, angle)
     tilt = prior.tilt(values)
     on_base = rotation @ tilt.as_matrix()
-    along = np.broadcast_to(prior.mean.axis, centre.shape)
+    ways = np.broadcast_to(prior.ways.T, (len(centre), 3, 3))
     about = wobble.apply(np.cross(machine.axis, turned))[..., None]
     tilts = (left_jacobian(tilt.as_rotvec()) @ prior.across.T).T
     # A sphere c is tilted along, so of its arm only the axis's point and its sag are not.
@@ -256,39 +302,61 @@ def sphere_slopes(
     ]
     placed = wobble.apply(machine.axis_point + turned)
     turns = (left_jacobian(turn) @ prior.across.T).swapaxes(1, 2)
-    by_power = {}
+    by_power, arm = {}, prior.arms(values)[sphere]
     if prior.mean.forms is not None:
-        back = -prior.radius_by_power(values)[sphere, None] * prior.mean.forms.outward[sphere]
+        outward = prior.cap_tilts(values).apply(prior.mean.forms.outward)
+        back = -prior.radius_by_power(values)[sphere, None] * outward[sphere]
         by_power = {Block.POWER: on_base @ back[..., None]}
+    swung = np.cross(cap_turns(prior, values)[sphere], arm[:, None]).swapaxes(1, 2)
     return Slopes(
         {Of.FRAME: frame, Of.SPHERE: sphere, Of.SERIES: prior.series[frame]},
         {
-            Block.CARRIER: on_base @ np.stack([prior.mean.centre[sphere], along], axis=2),
+            Block.CARRIER: on_base @ np.concatenate([prior.seat[sphere, :, None], ways], axis=2),
             Block.CENTRES: on_base,
+            Block.CAP_TILT: on_base @ swung,
             Block.TILT: np.stack(by_tilt, axis=2),
             Block.AXIS_POINT: (wobble.as_matrix() - rotation) @ prior.across.T,
             Block.OFFSET: about,
             Block.ANGLES: about,
             Block.TURN: np.cross(turns, placed[:, None]).swapaxes(1, 2),
-            Block.SHIFT: np.broadcast_to(prior.ways.T, (len(frame), 3, 3)),
+            Block.SHIFT: ways,
             Block.SAG: (rotation @ sag[..., None]),
             **by_power,
         },
     )
 
 
-def turn_slopes(prior: Prior, values: Floats, machine: Machine, frame: Ints) -> dict[Block, Floats]:
-    """Small rotations of the base in frames, (n, 3, c), by what turns it: forms turn with it."""
+def cap_turns(prior: Prior, values: Floats) -> Floats:
+    """Small rotations of spheres about their seats by both of their tilts, (k, 2, 3)."""
+    by = left_jacobian(prior.cap_tilts(values).as_rotvec())
+    return np.asarray(prior.across_arms @ by.swapaxes(1, 2))
+
+
+def turn_slopes(
+    prior: Prior, values: Floats, machine: Machine, frame: Ints, sphere: Ints
+) -> dict[Block, Floats]:
+    """Small rotations of forms of spheres in frames, (n, 3, c), by what turns base and caps."""
     turn = np.zeros((len(frame), 3)) if machine.turn is None else machine.turn[frame]
     wobble = Rotation.from_rotvec(turn).as_matrix()
     tilts = left_jacobian(prior.tilt(values).as_rotvec()) @ prior.across.T
     about = wobble @ machine.axis[:, None]
+    on_base = (
+        wobble @ _matrices(machine.axis, machine.angle[frame]) @ prior.tilt(values).as_matrix()
+    )
     return {
+        Block.CAP_TILT: on_base @ cap_turns(prior, values)[sphere].swapaxes(1, 2),
         Block.TILT: wobble @ tilts,
         Block.OFFSET: about,
         Block.ANGLES: about,
         Block.TURN: left_jacobian(turn) @ prior.across.T,
     }
+
+
+def camera_turns(prior: Prior, values: Floats) -> tuple[Floats, Floats]:
+    """Small rotations of what the camera sees, by its turn, (3, 3), and principal point, (3, 2)."""
+    turn = prior.blocks(values)[Block.CAMERA_TURN]
+    aim = left_jacobian(prior.aim(values)) @ prior.by_principal
+    return left_jacobian(turn), Rotation.from_rotvec(turn).as_matrix() @ aim
 
 
 def base_slopes(prior: Prior, values: Floats) -> Slopes:
@@ -299,7 +367,7 @@ def base_slopes(prior: Prior, values: Floats) -> Slopes:
     moved = sphere_slopes(prior, values, still, 0 * every, every)
     by: dict[Block, Floats] = {
         block: np.pad(moved.by[block], ((0, 0), (0, 1), (0, 0)))
-        for block in (Block.CENTRES, Block.CARRIER, Block.TILT, Block.POWER)
+        for block in (Block.CENTRES, Block.CARRIER, Block.TILT, Block.CAP_TILT, Block.POWER)
         if block in moved.by
     }
     if Block.POWER in by:

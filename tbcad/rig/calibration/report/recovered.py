@@ -16,7 +16,9 @@ from tbcad.core.optics.sphere_forms import TERM_COUNT, ray_reach, surface_normal
 from tbcad.rig.calibration.calibrate import MachineCalibration
 from tbcad.rig.calibration.estimate.parameters import (
     Block,
+    Slopes,
     base_slopes,
+    camera_turns,
     covariances,
     sphere_slopes,
 )
@@ -84,7 +86,7 @@ def recovered_errors(result: MachineCalibration, truth: Machine) -> tuple[Kind, 
         (
             *("camera's direction", "mrad", MILLI),
             lambda one: Rotation.from_matrix(one.camera.axes @ axes.T).as_rotvec(),
-            of[Block.CAMERA_TURN],
+            _direction_sigmas(result.found),
         ),
         ("lens", "deviations of the prior", 1.0, lambda one: _lens(one) / width, lens / width),
         ("LEDs", "um", MICROMETRES, lambda one: one.leds, of[Block.LEDS]),
@@ -149,6 +151,13 @@ def _middle_sigmas(found: Estimate) -> Floats:
     by = kron_array(mean, eye_array(3)) @ slopes.matrix(found.prior)
     known = covariances(found.covariance, csr_array(by), 3)
     return np.asarray(np.sqrt(np.diagonal(known, axis1=1, axis2=2)))
+
+
+def _direction_sigmas(found: Estimate) -> Floats:
+    """Of the camera's rotation about its own axes, radians, (3,)."""
+    turn, aim = camera_turns(found.prior, found.values)
+    slopes = Slopes({}, {Block.CAMERA_TURN: turn[None], Block.PRINCIPAL: aim[None]})
+    return np.asarray(np.sqrt(np.diag(found.covariances(slopes)[0])))
 
 
 def _terms(machine: Machine) -> Floats:

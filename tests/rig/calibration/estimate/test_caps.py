@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tbcad.core.geometry.vectors import perpendicular_axes, unit
+from tbcad.core.geometry.vectors import perpendicular_axes
 from tbcad.core.optics.sphere_forms import TERM_COUNT, Forms, sagitta
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
@@ -16,9 +16,10 @@ from tbcad.rig.machine.designed import sag_motion
 from tbcad.rig.machine.machine import Machine
 from tbcad.tolerancing.process.process import load_process, process_errors
 from tests.rig.calibration.machines import (
-    PINHOLE,
     drawn,
     every_highlight,
+    outward,
+    seats,
     small_machine,
     small_prior,
 )
@@ -30,8 +31,7 @@ STEP = 1e-4  # of the prior standard deviations
 def capped_machine() -> Machine:
     """Two of its balls are caps."""
     machine = small_machine()
-    outward = unit(unit(-machine.centre) + unit(PINHOLE - machine.centre))
-    forms = Forms(np.zeros((len(HALF), TERM_COUNT)), perpendicular_axes(outward), HALF)
+    forms = Forms(np.zeros((len(HALF), TERM_COUNT)), perpendicular_axes(outward(machine)), HALF)
     return replace(machine, forms=forms)
 
 
@@ -66,7 +66,11 @@ def test_a_power_moves_no_apex_and_is_the_sagitta(prior: Prior) -> None:
 
 
 @pytest.mark.parametrize(
-    "block", [Block.POWER, Block.FORM, Block.CENTRES, Block.RADII, Block.TILT, Block.TURN]
+    "block",
+    [
+        *(Block.POWER, Block.FORM, Block.CENTRES, Block.CAP_TILT, Block.RADII),
+        *(Block.CARRIER, Block.TILT, Block.TURN, Block.CAMERA_TURN, Block.PRINCIPAL),
+    ],
 )
 def test_slopes_are_those_of_finite_differences(prior: Prior, block: Block) -> None:
     values, machine = drawn(prior, 3)
@@ -103,10 +107,10 @@ def test_a_measured_radius_is_one_of_the_cap_about_its_apex() -> None:
     machine, errors = capped_machine(), process_errors(load_process("fdm"))
     none = [sag_motion(machine, machine.centre, np.zeros((len(machine.angle), len(HALF), 3)))]
     series = np.zeros(len(machine.angle), dtype=np.int64)
-    arms = np.where(HALF > 0, 8.0, 0.0)
+    seat = seats(machine, np.where(HALF > 0, 8.0, 0.0))
 
     def measured(value: float) -> Prior:
-        return prototype_prior(machine, none, errors, arms, series, measured=((4, value, 0.01),))
+        return prototype_prior(machine, none, errors, seat, series, measured=((4, value, 0.01),))
 
     prior, forms = measured(25.3), machine.forms
     assert forms is not None
@@ -117,3 +121,26 @@ def test_a_measured_radius_is_one_of_the_cap_about_its_apex() -> None:
     assert prior.sigma[Block.POWER][4] == pytest.approx(0.01 * 8**2 / (2 * 25**2), rel=0.1)
     with pytest.raises(InputError, match=r"16\.0 mm wide"):
         measured(7.0)
+
+
+def test_a_tilted_cap_takes_its_form_along_about_its_seat(prior: Prior) -> None:
+    values = np.zeros(len(prior.free))
+    values[of_block(prior, Block.CAP_TILT)] = 1.0
+    tilted, forms = prior.machine(values), prior.mean.forms
+    assert tilted.forms is not None
+    assert forms is not None
+    arm = prior.seat - tilted.centre
+    length = np.linalg.norm(arm, axis=1)
+    assert length == pytest.approx(np.linalg.norm(prior.arm, axis=1))
+    assert arm == pytest.approx(length[:, None] * tilted.forms.outward)
+    assert np.abs(tilted.forms.outward - forms.outward)[4].max() > 1e-3
+
+
+def test_a_camera_is_aimed_by_its_picture(prior: Prior) -> None:
+    """What was in the middle stays where it was, as far as the picture is not distorted."""
+    values = np.zeros(len(prior.free))
+    values[of_block(prior, Block.PRINCIPAL)] = 1.0
+    before, after = prior.mean.camera, prior.machine(values).camera
+    ahead = (before.pinhole + 100 * before.axes[2])[None]
+    assert np.abs(after.principal - before.principal).min() > 10
+    assert after.project(ahead) == pytest.approx(before.project(ahead), abs=0.05)
