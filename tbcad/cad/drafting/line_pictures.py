@@ -32,6 +32,7 @@ def line_picture(
     axes: Floats,
     piece: float,
     thin: Collection[str] = (),
+    scene: RayMeshIntersector | None = None,
 ) -> LinePicture:
     """Draw bodies.
 
@@ -40,10 +41,9 @@ def line_picture(
         axes: right, up and toward the eye, as rows, (3, 3).
         piece: longest piece of an edge that is tested as one, mm.
         thin: names of bodies that are drawn with fine lines.
+        scene: of the bodies; without one it is made.
     """
-    names = sorted(bodies)
-    whole = trimesh.util.concatenate([bodies[name] for name in names])
-    rays = RayMeshIntersector(whole)
+    names, rays = sorted(bodies), scene or ray_scene(bodies)
     lines: set[Line] = set()
     for name in names:
         layer = Layer.RAYS if name in thin else Layer.CUT
@@ -51,6 +51,11 @@ def line_picture(
     found = {name: _anchor(bodies[name], rays, axes) for name in names}
     anchors = {name: anchor for name, anchor in found.items() if anchor is not None}
     return LinePicture(tuple(sorted(lines, key=lambda one: (one.start, one.end))), anchors)
+
+
+def ray_scene(bodies: Mapping[str, trimesh.Trimesh]) -> RayMeshIntersector:
+    """All bodies for rays, in the order of their names."""
+    return RayMeshIntersector(trimesh.util.concatenate([bodies[name] for name in sorted(bodies)]))
 
 
 def _pieces(mesh: trimesh.Trimesh, eye: Floats, piece: float) -> tuple[Floats, Ints]:

@@ -8,7 +8,7 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from tbcad.cad.drafting.callouts import EDGE, PIXELS, balloons
-from tbcad.cad.drafting.line_pictures import LinePicture, axes_toward, line_picture
+from tbcad.cad.drafting.line_pictures import LinePicture, axes_toward, line_picture, ray_scene
 from tbcad.cad.drafting.sheet import Box
 from tbcad.cad.formats.entities import Entity, Layer, Line, Point, Polyline
 from tbcad.prototype.assembly_steps.exploded import offsets
@@ -42,9 +42,10 @@ def step_picture(machine: AssembledMachine, step: Step, bodies: Bodies, room: Bo
         for name in sorted({*new, *step.near} & bodies.keys())
     }
     groups = [[name for name in use.bodies if name in new] for use in step.parts]
-    axes = axes_toward(_best_eye(shown, [group for group in groups if group]))
+    rays = ray_scene(shown)
+    axes = axes_toward(_best_eye(shown, rays, [group for group in groups if group]))
     listed = [(use.item, group) for use, group in zip(step.parts, groups, strict=True)]
-    return _drawn(shown, new, axes, listed, room)
+    return _drawn(shown, new, axes, listed, room, rays)
 
 
 def whole_picture(machine: AssembledMachine, bodies: Bodies, room: Box) -> list[Entity]:
@@ -82,13 +83,14 @@ def _drawn(
     axes: Floats,
     listed: Iterable[tuple[int, list[str]]],
     room: Box,
+    rays: RayMeshIntersector | None = None,
 ) -> list[Entity]:
     """Lines in the room that balloons leave, and a balloon for each kind of part that is seen."""
     left, low, right, high = room
     edge = 2 * EDGE / PIXELS
     inner = (left + edge, low, right - edge, high)
     middle, scale = _fitted(shown, new, axes, inner)
-    picture = line_picture(shown, axes, PIECE_MM / scale, shown.keys() - new)
+    picture = line_picture(shown, axes, PIECE_MM / scale, shown.keys() - new, rays)
     centre = np.array([inner[0] + inner[2], inner[1] + inner[3]]) / 2
     on_paper = _placing(centre - scale * middle, scale)
     lines = [
@@ -187,10 +189,9 @@ def _other_end(line: Line, end: Point) -> Point:
     return line.end if line.start == end else line.start
 
 
-def _best_eye(bodies: Bodies, groups: list[list[str]]) -> Floats:
-    """The direction from which most kinds of new parts are seen."""
+def _best_eye(bodies: Bodies, rays: RayMeshIntersector, groups: list[list[str]]) -> Floats:
+    """The direction from which most kinds of new parts are seen; rays: of the bodies' scene."""
     names = sorted(bodies)
-    rays = RayMeshIntersector(trimesh.util.concatenate([bodies[name] for name in names]))
     owner = np.repeat(np.arange(len(names)), [len(bodies[name].faces) for name in names])
     numbers = [[names.index(name) for name in group] for group in groups]
     eyes, worth, seen = [], [], []
