@@ -11,7 +11,8 @@ from tbcad.cad.kernel.brep import Solid
 from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import reflectors
-from tbcad.shell.files import camera_solid, shell_envelope, write_shell_solids
+from tbcad.shell.files import camera_solid, write_shell_solids
+from tbcad.shell.halves import shell_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.tolerancing.montecarlo.builds import MonteCarloCase, simulate
 from tbcad.tolerancing.montecarlo.edge_model import edge_models

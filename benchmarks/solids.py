@@ -18,7 +18,8 @@ from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design, numbered
 from tbcad.core.optics.cells import cells_of
 from tbcad.core.optics.power_diagram import bounded_triangulation
 from tbcad.core.spec.load import load_spec
-from tbcad.shell.files import camera_solid, shell_envelope
+from tbcad.shell.files import camera_solid
+from tbcad.shell.halves import shell_envelope
 
 SEGMENTS = 64
 FUSED = (8, 16)

@@ -25,7 +25,7 @@ from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.load import load_spec
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.output.manifest import write_manifest
-from tbcad.shell.files import shell_envelope
+from tbcad.shell.halves import shell_envelope
 from tbcad.shell.mesh import shell_mesh
 from tbcad.tolerancing.montecarlo.builds import CoverageCase, MonteCarloCase, simulate
 from tbcad.tolerancing.montecarlo.coverage import coverage

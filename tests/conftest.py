@@ -22,7 +22,7 @@ from tbcad.light.simulate.prototype.run import Plan, read_plan
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.shell.envelope import Envelope
-from tbcad.shell.files import shell_envelope
+from tbcad.shell.halves import shell_envelope
 from tests.mirror_arrays import mirror_design
 from tests.prototype_exports import write_export, write_wind_up
 

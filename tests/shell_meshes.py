@@ -6,7 +6,8 @@ from tbcad.cad.formats.mesh_files import write_stl
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.mirrors.record import write_record
 from tbcad.light.simulate.scene.reflector import ExportedDesign, read_export
-from tbcad.shell.files import camera_a_mesh, shell_envelope, write_shell_solids
+from tbcad.shell.files import write_shell_solids
+from tbcad.shell.halves import camera_a_mesh, shell_envelope
 
 
 def export_with_meshes(folder: Path, made: MirrorDesign) -> ExportedDesign:

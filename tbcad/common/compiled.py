@@ -21,6 +21,17 @@ def compiled_loop(function: Function) -> Function:
     return _compiled(function, error_model="numpy")
 
 
+def compiled_part(function: Function) -> Function:
+    """The same for what other compiled loops alone call, and Python cannot.
+
+    It has neither a wrapper for Python nor a file: a quarter of the first compiling.
+    """
+    result: Function = njit(
+        nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
+    )(function)
+    return result
+
+
 def compiled_sum(function: Function) -> Function:
     """The same, and sums may be taken in another order: equal bits on equal processors only."""
     return _compiled(function, error_model="numpy", fastmath=True)

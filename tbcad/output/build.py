@@ -21,14 +21,8 @@ from tbcad.output.parts import PARTS, PROTOTYPE, SHELL, only_shell_remains
 from tbcad.prototype.files.write import export_prototype
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.design import ShellLamps
-from tbcad.shell.files import (
-    design_mandrel,
-    mandrel_record,
-    shell_envelope,
-    write_mandrels,
-    write_shell_meshes,
-    write_shell_solids,
-)
+from tbcad.shell.files import mandrel_record, write_mandrels, write_shell_meshes, write_shell_solids
+from tbcad.shell.halves import design_mandrel, shell_envelope
 from tbcad.shell_lamps.files import printed_ring, ring_record, write_ring
 from tbcad.shell_lamps.ring import lamp_ring
 from tbcad.types import Progress

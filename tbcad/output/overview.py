@@ -18,7 +18,7 @@ from tbcad.prototype.arrangement import PrototypeModel, arrange
 from tbcad.prototype.drive.balance import ball_masses, cap_volume
 from tbcad.prototype.files.bom import PRINT_MATERIAL, ball_rows, by_currency
 from tbcad.prototype.purchased.parts import load_prices
-from tbcad.shell.files import camera_a_mesh, design_mandrel
+from tbcad.shell.halves import camera_a_mesh, design_mandrel
 from tbcad.types import Progress
 
 # Hours of printing for a cubic centimetre of solid volume, and filament, supports included, as a

@@ -11,7 +11,7 @@ from math import cos, inf, pi, sin, sqrt
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from tbcad.common.compiled import compiled_loop
+from tbcad.common.compiled import compiled_loop, compiled_part
 from tbcad.core.geometry.loop_vectors import Vector
 from tbcad.core.geometry.primitives import Primitive, enclosing_triangles, rectangle
 from tbcad.core.geometry.rotations import even_angles, unit_circle
@@ -233,8 +233,10 @@ def lower_to_section(points: Floats, polygon: Floats, turned: Floats, distances:
 
     The polygon (p, 2) has z and r of the section's corners, mm; it turns in a range (2,).
     """
-    low_z, high_z = polygon[:, 0].min(), polygon[:, 0].max()
-    low_r, high_r = polygon[:, 1].min(), polygon[:, 1].max()
+    low_z, low_r, high_z, high_r = inf, inf, -inf, -inf
+    for k in range(len(polygon)):
+        low_z, high_z = min(low_z, polygon[k, 0]), max(high_z, polygon[k, 0])
+        low_r, high_r = min(low_r, polygon[k, 1]), max(high_r, polygon[k, 1])
     for i in range(len(points)):
         z, out, away = _from_range(points[i, 0], points[i, 1], points[i, 2], turned)
         beyond_z, beyond_r = max(low_z - z, z - high_z, 0.0), max(low_r - out, out - high_r, 0.0)
@@ -244,7 +246,7 @@ def lower_to_section(points: Floats, polygon: Floats, turned: Floats, distances:
             distances[i] = min(distances[i], sqrt(square + away * away))
 
 
-@compiled_loop
+@compiled_part
 def _from_range(z: float, r: float, azimuth: float, turned: Floats) -> Vector:
     """A point as seen from the nearest half-plane of a range of azimuths.
 
@@ -257,7 +259,7 @@ def _from_range(z: float, r: float, azimuth: float, turned: Floats) -> Vector:
     return z, r * cos(beyond), r * sin(beyond)
 
 
-@compiled_loop
+@compiled_part
 def _to_cone(point: Vector, cone: Floats) -> float:
     """Signed distance of a point to a round cone, exact outside.
 
@@ -273,7 +275,7 @@ def _to_cone(point: Vector, cone: Floats) -> float:
     return distance
 
 
-@compiled_loop
+@compiled_part
 def _square_to_polygon(x: float, y: float, polygon: Floats) -> float:
     """Square of the distance of a point to a polygon (p, 2), 0 inside."""
     square, inside, last = inf, False, len(polygon) - 1

@@ -28,11 +28,16 @@ from tbcad.core.mirrors.record import part_files
 from tbcad.core.optics.cells import Cells, cell_integrals
 from tbcad.core.optics.pedestals.cells import PedestalCells, wall_integrals
 from tbcad.records.design import MandrelRecord
-from tbcad.shell.envelope import Envelope, Holes, boundary_chain, chain_ends, closing_envelope
-from tbcad.shell.mandrel import Mandrel, mandrel_of
-from tbcad.shell.mesh import FROM_X, FROM_Z, MeshBuilder, front_facets, shell_mesh
+from tbcad.shell.envelope import Envelope, Holes, boundary_chain, chain_ends
+from tbcad.shell.halves import (
+    camera_a_mandrel_mesh,
+    camera_a_mesh,
+    design_mandrel,
+    shell_envelope,
+)
+from tbcad.shell.mandrel import Mandrel
 from tbcad.shell.solid import FrontEdges, casing_faces, front_edges, reversed_ring
-from tbcad.types import Floats, Ints, Progress
+from tbcad.types import Floats, Progress
 
 X, Y, Z = np.eye(3)
 DRAFT_DIGITS = 6
@@ -69,12 +74,6 @@ def write_shell_solids(
         progress(f"{files['name']}: files")
         known = known.mirrored() if known and symmetric else shell_properties(solid, array)
         write_step(folder / files["step"], solid, design.spec.step.pcurves, known)
-
-
-def shell_envelope(design: MirrorDesign) -> Envelope:
-    """What closes camera a's half: back, flanges, holes; SpecError where these do not fit."""
-    array = design.arrays[0]
-    return closing_envelope(design.spec.shell, array.modelled_cells, array.ellipsoid)
 
 
 def camera_solid(
@@ -137,39 +136,6 @@ def shell_properties(
     return properties_within(total)
 
 
-def camera_a_mesh(design: MirrorDesign, envelope: Envelope | None = None) -> Mesh:
-    """Mesh of camera a's half; the envelope is worked out (or SpecError) where it is not given."""
-    array = design.arrays[0]
-    envelope = envelope or shell_envelope(design)
-    return shell_mesh(design.spec, array.modelled_cells, envelope, array.apex_distance)
-
-
-def camera_a_mandrel_mesh(design: MirrorDesign, mandrel: Mandrel | None = None) -> Mesh:
-    """Mesh of camera a's negative, whose mirrors have the facets of `shell_mesh`.
-
-    The mandrel is worked out (or SpecError) where it is not given.
-    """
-    cells, mandrel = design.arrays[0].modelled_cells, mandrel or design_mandrel(design)
-    builder, outlines = front_facets(design.spec, cells, design.arrays[0].apex_distance)
-    builder.triangles = [triangles[:, ::-1] for triangles in builder.triangles]
-    seam, foot = (
-        outlines.along(boundary_chain(cells, plane)) for plane in (cells.seam, cells.foot)
-    )
-    # Low y to high y: over the top from +x that turns right, round the front from +z left.
-    _meshed_plane(builder, seam[::-1], mandrel.seam_holes, np.stack([Y, Z]), FROM_X)
-    _meshed_plane(builder, foot, mandrel.foot_holes, np.stack([X, Y]), FROM_Z)
-    return builder.mesh()
-
-
-def _meshed_plane(
-    builder: MeshBuilder, ring: Ints, holes: Holes, axes: Floats, view: list[int]
-) -> None:
-    near, far = builder.holes(holes, axes)
-    builder.plane(view, ring, near, away=True)
-    for rim in far:
-        builder.plane(view, rim[::-1], [], away=True)
-
-
 def closing_faces(front: FrontEdges, mandrel: Mandrel) -> NamedFaces:
     """Names and faces of everything but the mirrors and the walls of their pedestals."""
     maker, cells = front.maker, front.cells
@@ -206,12 +172,6 @@ def _plane_with_holes(
         for k, (wall, bottom) in enumerate(zip(walls, bottoms, strict=True), start=1)
     )
     return [(name, plane), *chain.from_iterable(inner)]
-
-
-def design_mandrel(design: MirrorDesign) -> Mandrel:
-    """What closes camera a's mirrors to a negative; SpecError if there is no room for its holes."""
-    array = design.arrays[0]
-    return mandrel_of(design.spec.shell, array.modelled_cells, array.ellipsoid)
 
 
 @kept("mandrels")

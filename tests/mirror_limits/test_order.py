@@ -23,7 +23,8 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.mirror_limits.held import chain_of, confidence, sampled, two_sigma
 from tbcad.mirror_limits.sensitivity import MirrorLimits
-from tbcad.shell.files import design_mandrel, write_mandrels
+from tbcad.shell.files import write_mandrels
+from tbcad.shell.halves import design_mandrel
 from tbcad.tolerancing.process.chain import ChainStep
 from tbcad.tolerancing.process.process import BUILT_IN, load_process
 from tests.exported_files import contents, read_csv

@@ -13,7 +13,7 @@ from tbcad.output.overview import Overview, overview
 from tbcad.output.parts import SHELL
 from tbcad.prototype.arrangement import arrangements
 from tbcad.prototype.model import build_prototype_model
-from tbcad.shell.files import camera_a_mesh
+from tbcad.shell.halves import camera_a_mesh
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from tbcad.prototype.assembly_steps.machine import read_machine
 from tbcad.report.close_ups import cells_aimed_at_origin, edge_of_field, seam_mirror
 from tbcad.report.shell_pictures import mirror_of_facets, read_modelled, section_of
 from tbcad.shell.facets import mirror_facets
-from tbcad.shell.files import camera_a_mesh
+from tbcad.shell.halves import camera_a_mesh
 from tests.exported_files import contents
 from tests.mirror_arrays import mirror_design
 from tests.prototype.assembly_steps.test_steps import LOOSE, belt_design, write

@@ -8,13 +8,8 @@ from OCP.BRepCheck import BRepCheck_Analyzer
 
 from tbcad.cad.kernel.checks import properties
 from tbcad.core.mirrors.array import MirrorDesign
-from tbcad.shell.files import (
-    camera_a_mandrel_mesh,
-    camera_a_mesh,
-    camera_solid,
-    mandrel_solid,
-    shell_properties,
-)
+from tbcad.shell.files import camera_solid, mandrel_solid, shell_properties
+from tbcad.shell.halves import camera_a_mandrel_mesh, camera_a_mesh
 from tests.helpers import volume
 from tests.mirror_arrays import mirror_design
 from tests.pedestal_designs import OPTIONS

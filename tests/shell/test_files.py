@@ -10,7 +10,8 @@ from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec, spec_dict
 from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
-from tbcad.shell.files import camera_solid, design_mandrel
+from tbcad.shell.files import camera_solid
+from tbcad.shell.halves import design_mandrel
 from tests.exported_files import contents, read_csv
 from tests.helpers import check_step, read_mesh, read_step
 from tests.mirror_arrays import mirror_design

@@ -8,7 +8,8 @@ from OCP.GeomAbs import GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.spec.errors import SpecError
-from tbcad.shell.files import design_mandrel, mandrel_solid
+from tbcad.shell.files import mandrel_solid
+from tbcad.shell.halves import design_mandrel
 from tbcad.shell.mandrel import best_pull, distances, draft_of
 from tests.helpers import bounds
 from tests.shell.test_bodies import made

@@ -8,7 +8,7 @@ from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.errors import SpecError
 from tbcad.shell.cell_outlines import CellOutlines
 from tbcad.shell.facets import Facets, middles, mirror_facets
-from tbcad.shell.files import camera_a_mesh, shell_envelope
+from tbcad.shell.halves import camera_a_mesh, shell_envelope
 from tests.mirror_arrays import mirror_design
 
 INWARD_FOOT = (

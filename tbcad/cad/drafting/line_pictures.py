@@ -5,6 +5,7 @@ Hidden edges are removed by rays on meshes, in seconds; exact removal takes minu
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import trimesh
@@ -18,6 +19,8 @@ SHARP_RAD = 0.6  # angle between faces that is drawn
 OFF_MM = 0.05  # of a ray's start from its edge
 DIGITS = 3
 
+Bodies: TypeAlias = Mapping[str, trimesh.Trimesh]
+
 
 @dataclass(frozen=True)
 class LinePicture:
@@ -29,8 +32,14 @@ class LinePicture:
 
 
 @kept("pictures")
-def line_picture(
-    bodies: Mapping[str, trimesh.Trimesh],
+def line_picture(bodies: Bodies, axes: Floats, piece: float) -> LinePicture:
+    """Draw bodies, as `seen_lines` does, by a scene of its own."""
+    return seen_lines(bodies, ray_scene(bodies), axes, piece)
+
+
+def seen_lines(
+    bodies: Bodies,
+    rays: RayMeshIntersector,
     axes: Floats,
     piece: float,
     thin: Collection[str] = (),
@@ -38,14 +47,13 @@ def line_picture(
     """Draw bodies.
 
     Args:
-        bodies: meshes in mm by name.
+        bodies: closed meshes by name.
+        rays: their `ray_scene`.
         axes: right, up and toward the eye, as rows, (3, 3).
         piece: longest piece of an edge that is tested as one, mm.
         thin: names of bodies that are drawn with fine lines.
     """
     names = sorted(bodies)
-    whole = trimesh.util.concatenate([bodies[name] for name in names])
-    rays = RayMeshIntersector(whole)
     lines: set[Line] = set()
     for name in names:
         layer = Layer.RAYS if name in thin else Layer.CUT
@@ -53,6 +61,11 @@ def line_picture(
     found = {name: _anchor(bodies[name], rays, axes) for name in names}
     anchors = {name: anchor for name, anchor in found.items() if anchor is not None}
     return LinePicture(tuple(sorted(lines, key=lambda one: (one.start, one.end))), anchors)
+
+
+def ray_scene(bodies: Bodies) -> RayMeshIntersector:
+    """All bodies for rays, in the order of their names."""
+    return RayMeshIntersector(trimesh.util.concatenate([bodies[name] for name in sorted(bodies)]))
 
 
 def _pieces(mesh: trimesh.Trimesh, eye: Floats, piece: float) -> tuple[Floats, Ints]:

@@ -10,7 +10,7 @@ from math import cos, radians, sin, sqrt
 
 import numpy as np
 
-from tbcad.common.compiled import compiled_loop
+from tbcad.common.compiled import compiled_loop, compiled_part
 from tbcad.core.geometry.conics import Ellipsoid
 from tbcad.core.geometry.loop_vectors import (
     Vector,
@@ -96,7 +96,7 @@ def _touching_tilts(
     return result
 
 
-@compiled_loop
+@compiled_part
 def _hits_sphere(point: Vector, normal: Vector, camera: Vector, capture: float) -> bool:
     """Whether a ray from the camera meets the capture sphere after a mirror at a point."""
     toward_origin = -dot(reflect(unit(minus(point, camera)), normal), point)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tbcad.common.compiled import compiled_loop
+from tbcad.common.compiled import compiled_loop, compiled_part
 from tbcad.common.reuse import kept
 from tbcad.core.geometry.loop_vectors import Vector, divided, dot, minus, plus_scaled, unit, vector
 from tbcad.core.geometry.vectors import norm
@@ -53,7 +53,7 @@ def lit_mirrors(mirrors: Surfaces, side: float, foot: float) -> LitMirrors:
     return LitMirrors(mirrors.centre, mirrors.radius, others, side, foot)
 
 
-@compiled_loop
+@compiled_part
 def reflection(centre: Vector, radius: float, lamp: Vector, place: Vector) -> tuple[Vector, float]:
     """Point of a sphere that reflects a lamp to a place, and how far its light spreads, mm2.
 
@@ -133,7 +133,7 @@ def _reflected_light(
     return light
 
 
-@compiled_loop
+@compiled_part
 def _in_cell(i: int, point: Vector, spheres: Floats, neighbours: Ints, ends: Floats) -> bool:
     """Whether a point of sphere i is on its side, above the foot and in no other sphere."""
     if point[0] * ends[0] < 0 or point[2] < ends[1]:
@@ -145,7 +145,7 @@ def _in_cell(i: int, point: Vector, spheres: Floats, neighbours: Ints, ends: Flo
     return True
 
 
-@compiled_loop
+@compiled_part
 def _passes(start: Vector, way: Vector) -> float:
     """Square of the distance from the origin at which a way from a point passes, mm2."""
     share = min(max(-dot(start, way) / dot(way, way), 0.0), 1.0)

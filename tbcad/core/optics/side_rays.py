@@ -7,7 +7,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from tbcad.common.compiled import compiled_loop
+from tbcad.common.compiled import compiled_loop, compiled_part
 from tbcad.core.geometry.loop_vectors import (
     Vector,
     cross,
@@ -73,7 +73,7 @@ def misses_of_balls(
     return result
 
 
-@compiled_loop
+@compiled_part
 def _on_side(points: Floats, weight: float, t: float) -> Vector:
     """Point of a side at a parameter."""
     first, middle, last = (1 - t) * (1 - t), 2 * t * (1 - t) * weight, t * t
@@ -83,7 +83,7 @@ def _on_side(points: Floats, weight: float, t: float) -> Vector:
     return plus_scaled(point, last / total, vector(points[2]))
 
 
-@compiled_loop
+@compiled_part
 def _turned(ray: Vector, ball: Floats) -> Vector:
     """A ray turned about the axis of a ball's window (Rodrigues' formula)."""
     axis, cosine = vector(ball, AXIS), ball[COSINE]
@@ -91,7 +91,7 @@ def _turned(ray: Vector, ball: Floats) -> Vector:
     return plus_scaled(turned, (1 - cosine) * dot(axis, ray), axis)
 
 
-@compiled_loop
+@compiled_part
 def _miss_of_ball(ray: Vector, ball: Floats, camera: Vector) -> float:
     """Distance from the origin of a ray of unit length from a camera after a ball."""
     centre, radius = vector(ball, CENTRE), ball[RADIUS]

@@ -1,6 +1,6 @@
 """Line pictures of the steps of assembly: new parts apart from their places, others thin."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from itertools import product
 
 import numpy as np
@@ -8,7 +8,7 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from tbcad.cad.drafting.callouts import EDGE, PIXELS, balloons
-from tbcad.cad.drafting.line_pictures import LinePicture, axes_toward, line_picture
+from tbcad.cad.drafting.line_pictures import Bodies, LinePicture, axes_toward, ray_scene, seen_lines
 from tbcad.cad.drafting.sheet import Box
 from tbcad.cad.formats.entities import Entity, Layer, Line, Point, Polyline
 from tbcad.common.reuse import kept
@@ -17,7 +17,6 @@ from tbcad.prototype.assembly_steps.machine import AssembledMachine
 from tbcad.prototype.assembly_steps.steps import Step
 from tbcad.types import Floats, Ints
 
-Bodies = Mapping[str, trimesh.Trimesh]
 FILLED, CONTEXT = 0.94, 0.45  # share of the room that new parts fill, and of all that is shown
 PIECE_MM = 0.4  # on paper, of edges that are tested as one
 # Directions to look from, degrees; their worth, since people look from above and from a corner.
@@ -43,9 +42,8 @@ def step_picture(machine: AssembledMachine, step: Step, bodies: Bodies, room: Bo
         for name in sorted({*new, *step.near} & bodies.keys())
     }
     groups = [[name for name in use.bodies if name in new] for use in step.parts]
-    axes = axes_toward(_best_eye(shown, [group for group in groups if group]))
     listed = [(use.item, group) for use, group in zip(step.parts, groups, strict=True)]
-    return _drawn(shown, new, axes, listed, room)
+    return _drawn(shown, new, None, listed, room)
 
 
 def whole_picture(machine: AssembledMachine, bodies: Bodies, room: Box) -> list[Entity]:
@@ -68,7 +66,7 @@ def whole_picture(machine: AssembledMachine, bodies: Bodies, room: Box) -> list[
     for name in sorted(new):
         if part := machine.bodies[name]:
             names.setdefault(machine.bill.items[part], []).append(name)
-    return _drawn(shown, new, axes_toward(EXPLODED_EYE), sorted(names.items()), room)
+    return _drawn(shown, new, EXPLODED_EYE, sorted(names.items()), room)
 
 
 def _moved(mesh: trimesh.Trimesh, way: Floats) -> trimesh.Trimesh:
@@ -77,19 +75,25 @@ def _moved(mesh: trimesh.Trimesh, way: Floats) -> trimesh.Trimesh:
     return found
 
 
+@kept("pictures")
 def _drawn(
     shown: Bodies,
     new: frozenset[str],
-    axes: Floats,
-    listed: Iterable[tuple[int, list[str]]],
+    eye: tuple[float, float, float] | None,
+    listed: list[tuple[int, list[str]]],
     room: Box,
 ) -> list[Entity]:
-    """Lines in the room that balloons leave, and a balloon for each kind of part that is seen."""
+    """Lines in the room that balloons leave, and a balloon for each kind of part that is seen.
+
+    From the direction `eye`; None: from which most kinds are seen.
+    """
+    rays = ray_scene(shown)
+    axes = axes_toward(eye or _best_eye(shown, rays, [group for _, group in listed if group]))
     left, low, right, high = room
     edge = 2 * EDGE / PIXELS
     inner = (left + edge, low, right - edge, high)
     middle, scale = _fitted(shown, new, axes, inner)
-    picture = line_picture(shown, axes, PIECE_MM / scale, shown.keys() - new)
+    picture = seen_lines(shown, rays, axes, PIECE_MM / scale, shown.keys() - new)
     centre = np.array([inner[0] + inner[2], inner[1] + inner[3]]) / 2
     on_paper = _placing(centre - scale * middle, scale)
     lines = [
@@ -188,11 +192,9 @@ def _other_end(line: Line, end: Point) -> Point:
     return line.end if line.start == end else line.start
 
 
-@kept("pictures")
-def _best_eye(bodies: Bodies, groups: list[list[str]]) -> Floats:
-    """The direction from which most kinds of new parts are seen."""
+def _best_eye(bodies: Bodies, rays: RayMeshIntersector, groups: list[list[str]]) -> Floats:
+    """The direction from which most kinds of new parts are seen; rays: of the bodies' scene."""
     names = sorted(bodies)
-    rays = RayMeshIntersector(trimesh.util.concatenate([bodies[name] for name in names]))
     owner = np.repeat(np.arange(len(names)), [len(bodies[name].faces) for name in names])
     numbers = [[names.index(name) for name in group] for group in groups]
     eyes, worth, seen = [], [], []

@@ -15,7 +15,7 @@ from math import inf
 
 import numpy as np
 
-from tbcad.common.compiled import compiled_loop
+from tbcad.common.compiled import compiled_loop, compiled_part
 from tbcad.core.geometry.loop_vectors import dot, minus, plus_scaled, vector
 from tbcad.tolerancing.montecarlo.edge_model import PairArrays
 from tbcad.tolerancing.montecarlo.edge_samples import (
@@ -122,13 +122,11 @@ def trace_cell_edges(
                     parts = _with_room(parts, count)
                     _put_part(parts[count], i, other, edge, low, high, samples)
                     count += 1
-    result[:, MISS_SQUARED] = _minima(
-        surfaces, forms, view, parts[:count], len(result), worst_only, samples
-    )
+    _put_minima(surfaces, forms, view, parts[:count], worst_only, samples, result)
     return result
 
 
-@compiled_loop
+@compiled_part
 def _count_crossings(
     surfaces: Floats,
     halved: Bools,
@@ -150,27 +148,33 @@ def _count_crossings(
             result[i, CROSSINGS] += screen_crossings(screen[i], samples)
 
 
-@compiled_loop
+@compiled_part
 def _limits_coverage(i: int, other: int, own: int, halved: Bools) -> bool:
     """Whether an edge of a face and another, of its own face or both, limits what it covers."""
     m = len(halved)
     return i < m and own in (BOTH, i) and not (halved[i] and other == m)
 
 
-@compiled_loop
+@compiled_part
 def _with_room(parts: Floats, count: int) -> Floats:
     """The same parts with at least one place more."""
-    return parts if count < len(parts) else np.concatenate((parts, np.empty_like(parts)))
+    if count < len(parts):
+        return parts
+    more = np.empty((2 * len(parts), COLUMNS))
+    for k in range(count):
+        for column in range(COLUMNS):
+            more[k, column] = parts[k, column]
+    return more
 
 
-@compiled_loop
+@compiled_part
 def _touch(surfaces: Floats, own: int, view: Floats, samples: Floats) -> None:
     """Take points of centres to where their balls touch a mirror, where valleys have fillets."""
     if view[VALLEY, 0] > 0:
         touch_samples(surfaces[own], view, samples)
 
 
-@compiled_loop
+@compiled_part
 def _put_planes_of_centres(
     surfaces: Floats,
     mirror: int,
@@ -199,7 +203,7 @@ def _put_planes_of_centres(
         centres[k, APEX], centres[k, APEX + 1], centres[k, APEX + 2] = moved
 
 
-@compiled_loop
+@compiled_part
 def _sample(
     edge: Floats,
     span: tuple[float, float],
@@ -216,7 +220,7 @@ def _sample(
     _touch(surfaces, faces[0], view, samples)
 
 
-@compiled_loop
+@compiled_part
 def _reflect(surfaces: Floats, forms: Floats, mirror: int, view: Floats, samples: Floats) -> None:
     if len(forms) == 0:
         reflect_samples(surfaces[mirror], view, samples)
@@ -224,7 +228,7 @@ def _reflect(surfaces: Floats, forms: Floats, mirror: int, view: Floats, samples
         reflect_formed_samples(surfaces[mirror], forms[mirror], view, samples)
 
 
-@compiled_loop
+@compiled_part
 def _put_part(
     part: Floats, mirror: int, other: int, edge: Floats, low: float, high: float, samples: Floats
 ) -> None:
@@ -236,32 +240,36 @@ def _put_part(
     part[LEAST], part[BOUND] = samples[DISTANCE + least], lower_bound(samples, least)
 
 
-@compiled_loop
-def _minima(
+@compiled_part
+def _put_minima(
     surfaces: Floats,
     forms: Floats,
     view: Floats,
     parts: Floats,
-    m: int,
     worst_only: bool,
     samples: Floats,
-) -> Floats:
-    """Minimum distance squared of each mirror's rays, (m,); see `trace_cell_edges`."""
-    sampled, refined = np.full(m, inf), np.full(m, inf)
+    result: Floats,
+) -> None:
+    """Fill in the minimum distance squared of each mirror's rays; see `trace_cell_edges`."""
+    m, worst = len(result), inf
+    sampled, refined, limit = np.full(m, inf), np.full(m, inf), np.full(m, inf)
     for part in parts:
         i = int(part[MIRROR])
         sampled[i] = min(sampled[i], part[LEAST])
-    limit = np.full(1, sampled.min()) if worst_only else sampled.copy()
+        worst = min(worst, sampled[i])
+    for i in range(m):
+        limit[i] = worst if worst_only else sampled[i]
     for part in parts:
         i = int(part[MIRROR])
         place = 0 if worst_only else i
         if not part[BOUND] > limit[place]:  # NaN too
             least = _refined(surfaces, forms, view, part, limit[place], samples)
             refined[i], limit[place] = min(refined[i], least), min(limit[place], least)
-    return np.where(np.isinf(refined), sampled, refined)
+    for i in range(m):
+        result[i, MISS_SQUARED] = sampled[i] if refined[i] == inf else refined[i]
 
 
-@compiled_loop
+@compiled_part
 def _refined(
     surfaces: Floats, forms: Floats, view: Floats, part: Floats, limit: float, samples: Floats
 ) -> float:

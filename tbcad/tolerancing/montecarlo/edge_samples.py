@@ -6,7 +6,7 @@ become vector instructions of the processor. The points are those of both mirror
 
 from math import sqrt
 
-from tbcad.common.compiled import compiled_loop
+from tbcad.common.compiled import compiled_part
 from tbcad.core.geometry.loop_vectors import Vector, cross, dot, minus, plus_scaled, vector
 from tbcad.tolerancing.montecarlo.visible_edges import (
     APEX,
@@ -41,21 +41,21 @@ FIRST_AXIS, SECOND_AXIS, FACING = 0, 1, 2
 MAX_FALL = 0.5
 
 
-@compiled_loop
+@compiled_part
 def get_sample(samples: Floats, quantity: int, s: int) -> Vector:
     """A quantity of three numbers at a sample."""
     first = quantity + s
     return samples[first], samples[first + STRIDE], samples[first + 2 * STRIDE]
 
 
-@compiled_loop
+@compiled_part
 def put_sample(samples: Floats, quantity: int, s: int, value: Vector) -> None:
     """Fill in a quantity of three numbers at a sample."""
     first = quantity + s
     samples[first], samples[first + STRIDE], samples[first + 2 * STRIDE] = value
 
 
-@compiled_loop
+@compiled_part
 def sample_points(edge: Floats, low: float, high: float, view: Floats, samples: Floats) -> None:
     """Fill in points of an edge (`find_edge`), and rays to them, from parameter low to high."""
     start, tangent, outward = vector(edge, START), vector(edge, TANGENT), vector(edge, OUTWARD)
@@ -71,7 +71,7 @@ def sample_points(edge: Floats, low: float, high: float, view: Floats, samples: 
         put_sample(samples, RAY, s, minus(point, pinhole))
 
 
-@compiled_loop
+@compiled_part
 def touch_samples(surface: Floats, view: Floats, samples: Floats) -> None:
     """Fill in where a ball about each point touches the mirror that a surface (7,) is beside.
 
@@ -89,7 +89,7 @@ def touch_samples(surface: Floats, view: Floats, samples: Floats) -> None:
         put_sample(samples, RAY, s, minus(point, pinhole))
 
 
-@compiled_loop
+@compiled_part
 def reflect_samples(surface: Floats, view: Floats, samples: Floats) -> None:
     """Fill in the rays that a surface (7,) reflects at the points, their moments and distances."""
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
@@ -99,7 +99,7 @@ def reflect_samples(surface: Floats, view: Floats, samples: Floats) -> None:
         reflect_sample(gradient, scale, middle, samples, s)
 
 
-@compiled_loop
+@compiled_part
 def reflect_sample(
     gradient: Vector, scale: Vector, middle: Vector, samples: Floats, s: int
 ) -> None:
@@ -119,7 +119,7 @@ def reflect_sample(
     samples[DISTANCE + s] = dot(moment, moment) / dot(out, out)
 
 
-@compiled_loop
+@compiled_part
 def screen_crossings(screen: Floats, samples: Floats) -> int:
     """How often the reflected line on a screen crosses the positive half of its first axis.
 
@@ -142,7 +142,7 @@ def screen_crossings(screen: Floats, samples: Floats) -> int:
     return count
 
 
-@compiled_loop
+@compiled_part
 def crosses_half_axis(x: float, y: float, next_x: float, next_y: float) -> bool:
     """Whether the line between two points crosses the positive half of the first axis."""
     if (y > 0) == (next_y > 0):
@@ -150,7 +150,7 @@ def crosses_half_axis(x: float, y: float, next_x: float, next_y: float) -> bool:
     return bool(x + y / (y - next_y) * (next_x - x) > 0)
 
 
-@compiled_loop
+@compiled_part
 def least_sample(samples: Floats) -> int:
     """Number of the sample with the minimum distance."""
     least = 0
@@ -160,7 +160,7 @@ def least_sample(samples: Floats) -> int:
     return least
 
 
-@compiled_loop
+@compiled_part
 def lower_bound(samples: Floats, least: int) -> float:
     """Lower bound of the squared distance between the samples; `least`: see `least_sample`."""
     distances = samples[DISTANCE:]
@@ -168,7 +168,7 @@ def lower_bound(samples: Floats, least: int) -> float:
     return bound
 
 
-@compiled_loop
+@compiled_part
 def rise_beside(values: Floats, count: int, least: int) -> float:
     """Rise from the minimum of even samples to the greater of the two samples nearest to it."""
     first = min(max(least - 1, 0), count - 3)
@@ -176,7 +176,7 @@ def rise_beside(values: Floats, count: int, least: int) -> float:
     return rise
 
 
-@compiled_loop
+@compiled_part
 def parabola_minimum(samples: Floats) -> float:
     """Minimum of the distances squared, on the parabola through its neighbours."""
     best = least_sample(samples)

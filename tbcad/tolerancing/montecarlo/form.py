@@ -19,7 +19,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tbcad.common.compiled import compiled_loop
+from tbcad.common.compiled import compiled_loop, compiled_part
 from tbcad.core.geometry.loop_vectors import Vector, dot, minus, plus_scaled, vector
 from tbcad.core.optics.sphere_forms import FIRST, HEIGHT, PER_MM, SECOND
 from tbcad.core.optics.zernike import ORDERS, TERMS
@@ -90,13 +90,13 @@ def form_numbers(form: Floats) -> Form:
     )  # fmt: skip
 
 
-@compiled_loop
+@compiled_part
 def _axes(form: Form) -> tuple[Vector, Vector]:
     first = form[FIRST], form[FIRST + 1], form[FIRST + 2]
     return first, (form[SECOND], form[SECOND + 1], form[SECOND + 2])
 
 
-@compiled_loop
+@compiled_part
 def place_in_cell(form: Form, offset: Vector) -> tuple[float, float]:
     """Coordinates x and y of a point at an offset from the apex."""
     unit = form[PER_MM]
@@ -133,7 +133,7 @@ def slope(form: Form, offset: Vector) -> Vector:
     )
 
 
-@compiled_loop
+@compiled_part
 def displace_samples(
     view: Floats, surfaces: Floats, forms: Floats, faces: tuple[int, int], samples: Floats
 ) -> None:
@@ -155,7 +155,7 @@ def displace_samples(
         put_sample(samples, RAY, s, minus(point, pinhole))
 
 
-@compiled_loop
+@compiled_part
 def _put_face(surface: Floats, form: Floats, samples: Floats, normals: int, heights: int) -> None:
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]
     numbers = form_numbers(form)
@@ -165,7 +165,7 @@ def _put_face(surface: Floats, form: Floats, samples: Floats, normals: int, heig
         samples[heights + s] = height(numbers, offset)
 
 
-@compiled_loop
+@compiled_part
 def reflect_formed_samples(surface: Floats, form: Floats, view: Floats, samples: Floats) -> None:
     """As `reflect_samples`, for a mirror with waviness."""
     apex, normal, curvature = vector(surface, APEX), vector(surface, NORMAL), surface[CURVATURE]

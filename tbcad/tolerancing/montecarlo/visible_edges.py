@@ -18,7 +18,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from tbcad.common.compiled import compiled_loop
+from tbcad.common.compiled import compiled_part
 from tbcad.core.geometry.loop_vectors import (
     Vector,
     cross,
@@ -39,7 +39,7 @@ APEX, NORMAL, CURVATURE = 0, 3, 6  # columns of a table of surfaces
 START, TANGENT, OUTWARD, BEND, EDGE_COLUMNS = 0, 3, 6, 9, 10
 
 
-@compiled_loop
+@compiled_part
 def visible_spans(
     surfaces: Floats, faces: Ints, edge: Floats, reach: float, spans: Floats, spare: Floats
 ) -> int:
@@ -60,7 +60,7 @@ def visible_spans(
     return count
 
 
-@compiled_loop
+@compiled_part
 def _surely_visible(a: float, b: float, c: float, first: float, last: float) -> bool:
     """Whether a + b t + c t^2 is positive from the first to the last t, beyond any rounding."""
     if not (_surely_positive(a, b * first, c * first * first)):
@@ -70,12 +70,12 @@ def _surely_visible(a: float, b: float, c: float, first: float, last: float) -> 
     return c <= 0 or (b + 2 * c * first) * (b + 2 * c * last) > 0
 
 
-@compiled_loop
+@compiled_part
 def _surely_positive(a: float, b: float, c: float) -> bool:
     return a + b + c > CERTAIN * (abs(a) + abs(b) + abs(c))
 
 
-@compiled_loop
+@compiled_part
 def find_edge(p: Floats, q: Floats, edge: Floats) -> bool:
     """Fill in the edge of two surfaces, p's curvature the greater; False where they do not meet."""
     kp, kq = p[CURVATURE], q[CURVATURE]
@@ -110,19 +110,19 @@ def find_edge(p: Floats, q: Floats, edge: Floats) -> bool:
     return True
 
 
-@compiled_loop
+@compiled_part
 def _put(edge: Floats, first: int, value: Vector) -> None:
     edge[first], edge[first + 1], edge[first + 2] = value
 
 
-@compiled_loop
+@compiled_part
 def _end_parameter(reach: float, bend: float) -> float:
     """Parameter of the point at a distance from x0, of the quarter circle if that is nearer."""
     share = reach * bend / 2
     return reach / sqrt(1 - share * share) if share < sqrt(0.5) else 2 / bend
 
 
-@compiled_loop
+@compiled_part
 def _value_along(surface: Floats, edge: Floats) -> Vector:
     """Coefficients of a surface's value along an edge, times w."""
     k, bend = surface[CURVATURE], edge[BEND]
@@ -133,7 +133,7 @@ def _value_along(surface: Floats, edge: Floats) -> Vector:
     return value, along, value * bend * bend / 4 - out * bend / 2 + k / 2
 
 
-@compiled_loop
+@compiled_part
 def _cut(a: float, b: float, c: float, spans: Floats, spare: Floats, count: int) -> int:
     """Keep the parts of the spans where a + b t + c t^2 is not negative; return their number."""
     low, high, between = _roots(a, b, c)
@@ -152,7 +152,7 @@ def _cut(a: float, b: float, c: float, spans: Floats, spare: Floats, count: int)
     return kept
 
 
-@compiled_loop
+@compiled_part
 def _roots(a: float, b: float, c: float) -> tuple[float, float, bool]:
     """Ends of the interval where a + b t + c t^2 is not negative, or else of where it is."""
     root = b * b - 4 * a * c

@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tbcad.common.compiled import compiled_loop
+from tbcad.common.compiled import compiled_loop, compiled_part
 from tbcad.core.geometry.loop_vectors import (
     Vector,
     cross,
@@ -78,7 +78,7 @@ def minimum_miss_distances(
     return result
 
 
-@compiled_loop
+@compiled_part
 def _crossings(samples: Floats) -> int:
     """How often a side's line crosses the half line from the highlight to the right."""
     count = 0
@@ -88,7 +88,7 @@ def _crossings(samples: Floats) -> int:
     return count
 
 
-@compiled_loop
+@compiled_part
 def _refined(
     side: Floats, best: int, minimum: float, lens: Floats, camera: Vector, ball: Ball
 ) -> float:
@@ -113,7 +113,7 @@ def _refined(
     return minimum
 
 
-@compiled_loop
+@compiled_part
 def _true_direction(direction: Floats, lens: Floats) -> Vector:
     d = vector(direction)
     return unit(
@@ -121,7 +121,7 @@ def _true_direction(direction: Floats, lens: Floats) -> Vector:
     )
 
 
-@compiled_loop
+@compiled_part
 def _miss(ray: Vector, camera: Vector, ball: Ball) -> float:
     """Distance squared from the origin of a ray after a ball; infinite if it misses, or leaves."""
     centre, radius, form = ball

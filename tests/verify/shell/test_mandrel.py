@@ -30,7 +30,7 @@ from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.spec.load import load_spec
 from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
-from tbcad.shell.files import camera_a_mandrel_mesh, camera_a_mesh
+from tbcad.shell.halves import camera_a_mandrel_mesh, camera_a_mesh
 from tests.exported_files import edit_json
 from tests.verify.optical_setups import IN_PROCESS, optical_setup_of
 

@@ -20,7 +20,7 @@ from tbcad.core.mirrors.array import MirrorDesign, design
 from tbcad.core.mirrors.record import write_record
 from tbcad.core.spec.load import load_spec
 from tbcad.output.manifest import write_manifest
-from tbcad.shell.files import camera_a_mesh
+from tbcad.shell.halves import camera_a_mesh
 from tests.verify.optical_setups import optical_setup_of
 from tests.verify.synthetic_export import Cells
 
