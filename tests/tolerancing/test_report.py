@@ -124,7 +124,7 @@ class TestWords:
             "A margin of 3.71 mm (tbcad build --radius-rule traced --set mirrors.margin_mm=3.71)",
             "Largest loss by sphere centre: 1.25 mm by itself",
             "above 1.88 micrometres (sla has 5)",
-            "of 100 each: fdm 0.0%, sla 25.0%, diamond 100.0%.",
+            "Yields of 100 builds each: fdm 0.0%, sla 25.0%, diamond 100.0%.",
             "sla with 3.71 mm, diamond with 0.56 mm; none was found for fdm.",
         ):
             assert words in said
