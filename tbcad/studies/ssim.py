@@ -30,7 +30,7 @@ from tbcad.light.simulate.views.viewpoints import (
     pinhole_targets,
 )
 from tbcad.options.captures import Geometry, Optics
-from tbcad.prototype.balls.catalogue import roughnesses_nm
+from tbcad.prototype.balls.catalogue import recorded_roughness_nm
 from tbcad.studies.paper import (
     balanced_sensors,
     claims,
@@ -275,7 +275,7 @@ def taken_by(
     """What takes the photographs of shell and prototype of an export."""
     if optics == "ideal":
         return {"spheres": samples, "prototype": samples}
-    balls = real_optics(export, roughnesses_nm(export.folder))[0]
+    balls = real_optics(export, recorded_roughness_nm(export.folder))[0]
     return {"spheres": real_optics(export)[0], "prototype": balls}
 
 
