@@ -47,7 +47,7 @@ def edges(folder: Path, rounds: int, builds: int = BUILDS) -> list[Row]:
 
 def _step_size(folder: Path, made: MirrorDesign) -> Row:
     folder.mkdir(parents=True, exist_ok=True)
-    write_shell_solids(made, shell_envelope(made), folder)
+    write_shell_solids(made, shell_envelope(made), folder, lambda _: None)
     sizes = tuple(path.stat().st_size / MEGABYTE for path in folder.glob("shell_?.step"))
     return at_most("STEP of one half, pedestals", Figure((max(sizes),)), 12, "MB")
 

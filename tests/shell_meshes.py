@@ -22,5 +22,5 @@ def export_with_meshes(folder: Path, made: MirrorDesign) -> ExportedDesign:
 def export_with_solids(folder: Path, made: MirrorDesign) -> Path:
     """Write the record of a design, with both shells as STEP beside it."""
     write_record(folder, made, shells=True)
-    write_shell_solids(made, shell_envelope(made), folder)
+    write_shell_solids(made, shell_envelope(made), folder, lambda _: None)
     return folder

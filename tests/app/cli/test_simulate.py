@@ -135,7 +135,8 @@ def test_capture_says_how_a_file_was_taken(record: Path, tmp_path: Path, cli: Co
     lost = "its texture C:\\lost.png is not in the folder of the mesh"
     assert f"tbcad: warning: a.obj: {lost}" in printed.err
     assert "a.obj: unit mm, y up, colours: colours of materials (Kd)" in printed.err
-    wanted = {"unit": "mm", "up": "y", "colours": "colours of materials (Kd)", "left_out": [lost]}
+    colours = "colours of materials (Kd)"
+    wanted = {"unit": "mm", "up": "y", "colours": colours, "gloss": "", "left_out": [lost]}
     assert json.loads(printed.out)["object_file"] == wanted
     assert json.loads((out / "capture.json").read_text())["object_file"] == wanted
 

@@ -179,7 +179,7 @@ def test_same_bytes_after_a_stop(epochs: int, ball: Path, made: Path, tmp_path: 
     with pytest.raises(KeyboardInterrupt):
         reconstruct(ball, out=out, **SMALL, detail=stopped_after(epochs))
     assert [file.name for file in tmp_path.iterdir()] == [".field.npz.part"]
-    with pytest.raises(InputError, match="go on with --resume, or begin anew with --force"):
+    with pytest.raises(InputError, match="go on with resume=True, or begin anew with force=True"):
         reconstruct(ball, out=out, **SMALL)
     told: list[str] = []
     reconstruct(ball, out=out, **SMALL, resume=True, detail=told.append)
@@ -214,7 +214,7 @@ def test_a_checkpoint_of_other_options_is_refused(ball: Path, tmp_path: Path) ->
             reconstruct(ball, out=out, resume=True, **{**SMALL, **other})
     assert part_file(out).read_bytes() == kept
     part_file(out).write_bytes(kept[:-2000])
-    with pytest.raises(InputError, match=r"is damaged .*: begin anew with --force"):
+    with pytest.raises(InputError, match=r"is damaged .*: begin anew with force=True"):
         reconstruct(ball, out=out, **SMALL, resume=True)
 
 

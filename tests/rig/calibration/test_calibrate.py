@@ -153,6 +153,7 @@ BASIS = (
 )
 NOISE_PX, SIGMA_MM = 0.05, 0.025
 BUILDS = 3
+MACHINES = 6  # of two of which a run shows halves
 
 
 def test_verdict_comes_first_and_fits_the_screen(calibrated: MachineCalibration) -> None:
@@ -344,13 +345,25 @@ def test_halves_differ_by_what_their_covariances_say(prior: Prior) -> None:
     assert all(0.2 < np.mean(squares) < 3 for squares in ratios.values())
 
 
+def _of_two_machines(one: Highlights, other: Highlights) -> Highlights:
+    """Every other frame as the other machine shows it, where it has the same highlight."""
+    places = zip(other.frame, other.led, other.sphere, strict=True)
+    pixel, shown = one.pixel.copy(), dict(zip(places, other.pixel, strict=True))
+    for k, place in enumerate(zip(one.frame, one.led, one.sphere, strict=True)):
+        if place[0] % 2 == 0:
+            pixel[k] = shown.get(place, pixel[k])
+    return replace(one, pixel=pixel)
+
+
 def test_halves_that_contradict_each_other_are_seen(prior: Prior) -> None:
-    highlights = every_highlight(drawn(prior, 1)[1], 2)
-    aside = np.where((highlights.frame % 2 == 0)[:, None], [0.0, 0.5], 0.0)
-    wrong = replace(highlights, pixel=highlights.pixel + aside * (highlights.sphere[:, None] % 3))
-    right, found = (_halves(prior, one)[0] for one in (highlights, wrong))
-    assert found.apart == "angles"
-    assert found.found_mm > 2 * right.found_mm
+    """The median over machines: the power of the flattest cap alone may differ by more."""
+    grown = []
+    for seed in range(MACHINES):
+        one, other = (every_highlight(drawn(prior, s)[1], 2) for s in (seed, seed + 20))
+        right, found = (_halves(prior, h)[0] for h in (one, _of_two_machines(one, other)))
+        assert found.apart == "angles"
+        grown.append(found.found_mm / right.found_mm)
+    assert np.median(grown) > 2
 
 
 def test_halves_of_too_few_highlights_are_left_out(prior: Prior) -> None:

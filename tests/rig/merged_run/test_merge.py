@@ -247,7 +247,7 @@ def test_refused(setting: Setting) -> None:
     write_exposure(setting.folder, FIRST, LIT, small, "a_0001_lit.png")
     message = "is 200 x 100 pixels, the run's photographs are 416 x 310"
     setting.refused(run, message, flat=(setting.folder / "a_0001_lit.png",))
-    with pytest.raises(InputError, match="name it with --exports"):
+    with pytest.raises(InputError, match="name it with exports"):
         merge(run, setting.calibration, out=setting.folder / "merged")
     edit_json(run / "run.json", lambda record: record["export_sha256"].update({"balls.csv": "0"}))
     setting.refused(run, "balls.csv is not the file that")
