@@ -3,6 +3,8 @@
 Booleans take lists: one general fuse of many bodies is faster than one after the other.
 """
 
+import errno
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -193,9 +195,10 @@ def _boolean(
 
 
 def to_bytes(shape: TopoDS_Shape) -> bytes:
-    """A shape as bytes from which it can be read again exactly."""
+    """A shape as bytes from which it can be read again exactly; OSError: there is no room."""
     with NamedTemporaryFile(prefix="tbcad-") as file:  # a BytesIO loses large shapes
-        BinTools.Write_s(shape, file.name)
+        if not BinTools.Write_s(shape, file.name):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), file.name)
         return Path(file.name).read_bytes()
 
 
