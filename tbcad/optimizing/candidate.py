@@ -18,19 +18,14 @@ from pydantic import TypeAdapter, ValidationError
 
 from tbcad.cad.formats.checked_files import parse_json
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign, design
-from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import FIT, Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.errors import InputError
 from tbcad.light.reconstruction.picture import BY_FIELD
-from tbcad.light.simulate.camera_photographs import sphere_light_field
-from tbcad.light.simulate.capture.light_field import LightField, traced_light_field
+from tbcad.light.simulate.camera_photographs import design_light_field
 from tbcad.light.simulate.capture.photograph import virtual_camera_pixels
-from tbcad.light.simulate.real_camera import design_optics
 from tbcad.light.simulate.scene.object import built_in_object
-from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.real_scene import scene_by
-from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.light.simulate.views.viewpoints import (
     BY_NEAREST,
     ELEVATIONS_DEG,
@@ -66,22 +61,9 @@ def mean_ssim(design: MirrorDesign, method: ViewsBy = "nearest", optics: Optics 
     with _one_at_a_time:
         truth = _truth(design.spec.optics.capture_diameter_mm, optics)
     by = BY_FIELD if method == "field" else BY_NEAREST
-    picture_of = by.views(_light_field(design, truth.scene, optics))
+    picture_of = by.views(design_light_field(design, truth.scene, optics, COARSER))
     views = zip(truth.cameras, truth.truths, strict=True)
     return float(np.mean([image_quality(real, picture_of(at)).ssim for at, real in views]))
-
-
-def _light_field(designed: MirrorDesign, scene: Scene, optics: Optics) -> LightField:
-    if optics == "ideal":
-        return traced_light_field(designed, scene)
-    capture_mm = designed.spec.optics.capture_diameter_mm
-    coarse = [replace(at, camera=_coarser(at.camera)) for at in reflectors(designed)]
-    return sphere_light_field(coarse, scene, capture_mm, design_optics(designed))
-
-
-def _coarser(camera: Camera) -> Camera:
-    width, height = camera.width_px // COARSER, camera.height_px // COARSER
-    return replace(camera, width_px=width, height_px=height)
 
 
 @cache

@@ -158,8 +158,8 @@ class SimulateRunOptions(Call):
     through lens and pupil of camera.json, shadows of the lamps, what balls scatter, as in tbcad
     capture --optics real; dust, hot pixels, noise and errors of the build in both."""
     gloss: Annotated[float | None, typer.Option(min=0.05, max=1, metavar="ROUGHNESS")] = None
-    """With --optics real: the object's roughness, from 0.05 (polished) to 1; by default it is
-    matt."""
+    """With --optics real: the object's roughness, from 0.05 (polished) to 1, in place of that of
+    its materials; by default as these say, else matt."""
 
     def check(self) -> None:
         """Refuse options that exclude each other, and numbers that are none.

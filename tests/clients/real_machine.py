@@ -7,12 +7,14 @@ on the side without mirrors. Light that other renderers give is kept in `rendere
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from tbcad.core.optics.lamp_light import RectangularLamps, irradiance
 from tbcad.core.optics.lens import PupilLens
+from tbcad.core.optics.surfaces import Surfaces
 from tbcad.light.simulate.capture.real import RealOptics, _band, mirror_rays, with_halo
 from tbcad.light.simulate.scene.object import SceneObject, built_in_object
 from tbcad.light.simulate.scene.rays import exact_tracer
@@ -30,6 +32,19 @@ WHITE_LUX = 2000.0  # what level 255 is of a matt white surface
 NEAR_MM, EDGE_PX = 33.0, 11  # where pixels are compared: round the object, off edges of mirrors
 BALL_MM, BALL_LAMP = 20.0, 4  # another object, in the light of one lamp
 LAMP_MM, LUMEN = (16.0, 50.0), 90.0
+
+
+def mitsuba_mirrors(mirrors: Surfaces) -> dict[str, Any]:
+    """Spheres that reflect all, as Mitsuba's scenes have them."""
+    return {
+        f"mirror_{k}": {
+            "type": "sphere",
+            "center": centre.tolist(),
+            "radius": float(radius),
+            "bsdf": {"type": "conductor", "material": "none"},
+        }
+        for k, (centre, radius) in enumerate(zip(mirrors.centre, mirrors.radius, strict=True))
+    }
 
 
 @dataclass(frozen=True)

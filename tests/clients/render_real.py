@@ -35,6 +35,7 @@ from tests.clients.real_machine import (
     at_pixels,
     compared,
     machine,
+    mitsuba_mirrors,
     steps,
 )
 
@@ -64,22 +65,14 @@ def object_file(folder: Path, part: str) -> Path:
 def by_mitsuba(mi: Any, mesh: Path, part: str, lamp: int) -> np.ndarray:
     """Luminance (2 h, 2 w, 3) of one part of the light of a lamp, lm / (sr mm^2)."""
     one = machine()
-    camera, mirrors = one.reflector.camera, one.reflector.mirrors
+    camera = one.reflector.camera
     turned = mi.ScalarTransform4f()
     ahead = (camera.pinhole + camera.forward).tolist()
     film: dict[str, Any] = {"type": "hdrfilm", "component_format": "float32"}
     film |= {"width": FINE * camera.width_px, "height": FINE * camera.height_px}
     names = "crop_offset_x", "crop_offset_y", "crop_width", "crop_height"
     film |= {name: FINE * value for name, value in zip(names, CROP, strict=True)}
-    shapes: dict[str, Any] = {
-        f"mirror_{k}": {
-            "type": "sphere",
-            "center": centre.tolist(),
-            "radius": float(radius),
-            "bsdf": {"type": "conductor", "material": "none"},
-        }
-        for k, (centre, radius) in enumerate(zip(mirrors.centre, mirrors.radius, strict=True))
-    }
+    shapes = mitsuba_mirrors(one.reflector.mirrors)
     place, way = one.lamps.places[lamp], one.lamps.inward[lamp]
     look = turned.look_at(place.tolist(), (place + way).tolist(), [0, 0, 1])
     shapes["lamp"] = {

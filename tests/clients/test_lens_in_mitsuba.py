@@ -24,6 +24,7 @@ from tbcad.light.simulate.scene.ray_casting import prepared_scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.reflector import Reflector, reflectors
 from tbcad.types import Floats, Ints
+from tests.clients.real_machine import mitsuba_mirrors
 
 pytestmark = pytest.mark.clients
 
@@ -35,18 +36,10 @@ EDGE_PX, WIDE_PX = 5, 0.3  # reach of an edge; spreads that are compared
 
 def rendered(mi: Any, one: Reflector) -> Floats:
     """A ball that shines evenly, 0 to 1, (h, w)."""
-    camera, mirrors = one.camera, one.mirrors
+    camera = one.camera
     ahead, up = camera.pinhole + camera.forward, -camera.axes[1]
     to_world = mi.ScalarTransform4f().look_at(camera.pinhole.tolist(), ahead.tolist(), up.tolist())
-    spheres = {
-        f"mirror_{k}": {
-            "type": "sphere",
-            "center": centre.tolist(),
-            "radius": float(radius),
-            "bsdf": {"type": "conductor", "material": "none"},
-        }
-        for k, (centre, radius) in enumerate(zip(mirrors.centre, mirrors.radius, strict=True))
-    }
+    spheres = mitsuba_mirrors(one.mirrors)
     film = {"width": camera.width_px, "height": camera.height_px, "rfilter": {"type": "box"}}
     film |= {"crop_offset_y": ROWS.start, "crop_height": len(ROWS)}
     film |= {"crop_offset_x": 0, "crop_width": camera.width_px}

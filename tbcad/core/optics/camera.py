@@ -55,6 +55,10 @@ class Camera:
         """Share of the frame that points (k, 3) fill, 1 on its edge; infinite behind the camera."""
         return _fill(self.forward, self.right, self.half_sizes, points - self.pinhole)
 
+    def coarser(self, times: int) -> "Camera":
+        """The same camera, each of its pixels as wide and high as so many."""
+        return replace(self, width_px=self.width_px // times, height_px=self.height_px // times)
+
     def mirrored(self) -> "Camera":
         """Camera b for camera a: the mirror image in the plane x = 0, with its rows reversed."""
         pinhole, forward, right = (

@@ -73,12 +73,18 @@ def sphere_photographs(
     return [(one, partial(photograph_of, one)) for one in both]
 
 
-def design_light_field(designed: MirrorDesign, scene: Scene, optics: Optics) -> LightField:
-    """The light field of a design: of ideal optics its pixels are traced when they are read."""
+def design_light_field(
+    designed: MirrorDesign, scene: Scene, optics: Optics, coarser: int = 1
+) -> LightField:
+    """The light field of a design: of ideal optics its pixels are traced when they are read.
+
+    `coarser`: pixels of the design along the sides of one, with real optics.
+    """
     if optics == "ideal":
         return traced_light_field(designed, scene)
     capture_mm = designed.spec.optics.capture_diameter_mm
-    return sphere_light_field(reflectors(designed), scene, capture_mm, design_optics(designed))
+    both = [replace(at, camera=at.camera.coarser(coarser)) for at in reflectors(designed)]
+    return sphere_light_field(both, scene, capture_mm, design_optics(designed))
 
 
 def sphere_light_field(

@@ -39,9 +39,7 @@ class _Material:
     colour: list[float] | None = None
     picture: str | None = None
     specular: list[float] | None = None
-    numbers: dict[str, float] = field(
-        default_factory=dict
-    )  # Ns, Pr, Pm and illum, in small letters
+    numbers: dict[str, float] = field(default_factory=dict)  # ns, pr, pm and illum
 
     def finish(self, facets: int) -> Finish | None:
         """How facets shine: by Pr and Pm, else by Ns and Ks; None: matt, as illum 0 and 1 say."""
