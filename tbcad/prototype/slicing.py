@@ -24,6 +24,7 @@ HOP_S = 0.5  # of it: 0.05 retracted, 0.1 lifted, the rest for 10 mm from rest t
 THIN = 1.2  # of a line's width: half of what is too narrow on a slope to get solid layers
 SUPPORT_MARGIN_MM = 2.4  # of supports round what they hold: 1.5 and most of half a grid's step
 FOOT_MM, FOOT_DENSITY = 3.0, 0.9  # how far the first layer of supports reaches out, and its density
+NOISE_MM = 0.005  # corners of a section that are no farther from a side do not count
 THIN_HANG_MM = 0.02  # an overhang of less is the noise of sections
 BRIDGED = 0.9  # share of an overhang that is between its anchors where it is a bridge
 FLAT = 0.5  # share of a flat overhang that is wider than a step of a slope
@@ -99,7 +100,8 @@ def print_estimate(mesh: Mesh, infill: float, nozzle_mm: float) -> tuple[float, 
     each = layers / count
     body = Manifold(Mesh64(mesh.vertices, mesh.triangles.astype(np.uint64)))
     middles = np.floor((np.arange(count) + 0.5) * each) + 0.5
-    groups = _groups([body.slice(low + at * use.layer) for at in middles], use, each)
+    sections = [body.slice(low + at * use.layer).simplify(NOISE_MM) for at in middles]
+    groups = _groups(sections, use, each)
     printed = np.array([_print_group(group, use, infill, each) for group in groups])
     volume, seconds = printed.sum(axis=0) * each
     return float(volume), float(seconds / HOUR_S)

@@ -61,7 +61,7 @@ def write_half_mesh(folder: Path, files: dict[str, str], mesh: Mesh, array: Mirr
 
 @kept("shells", heard=True)
 def write_shell_solids(
-    design: MirrorDesign, envelope: Envelope, folder: Path, progress: Progress
+    design: MirrorDesign, envelope: Envelope, folder: Path, progress: Progress = lambda _: None
 ) -> None:
     """Write both shells as STEP; the envelope closes camera a's half; or InvalidSolidError."""
     # The kernel integrates a back to some 1e-6 only, and alike in its mirror image only where the

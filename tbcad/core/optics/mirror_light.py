@@ -17,7 +17,8 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints
 
-STEPS = 20  # of the search for a point of reflection; each gains a digit or so
+STEPS = 20  # at most, of the search for a point of reflection; each gains a digit or so
+SETTLED = 1e-20  # square of a step of the unit normal, of which less than a tenth is left to go
 # Of each mirror, which of its neighbours' spheres may cover it: more than any cell has sides.
 NEIGHBOURS = 14
 ROUNDING_MM2 = 1e-9  # of the power of a point that is on two spheres
@@ -68,7 +69,11 @@ def reflection(centre: Vector, radius: float, lamp: Vector, place: Vector) -> tu
         to_lamp, to_place = minus(lamp, point), minus(place, point)
         s, t = np.sqrt(dot(to_lamp, to_lamp)), np.sqrt(dot(to_place, to_place))
         bisector = plus_scaled(divided(to_lamp, s), 1 / t, to_place)
-        normal = unit(plus_scaled(unit(bisector), radius / 2 * (1 / s + 1 / t), normal))
+        before = normal
+        normal = unit(plus_scaled(unit(bisector), radius / 2 * (1 / s + 1 / t), before))
+        change = minus(normal, before)
+        if dot(change, change) < SETTLED:
+            break
     outward = minus(point, centre)
     if dot(outward, to_lamp) <= 0 or dot(outward, to_place) <= 0:
         return point, np.inf

@@ -107,16 +107,20 @@ def _drawn(
 
 def _fitted(shown: Bodies, new: frozenset[str], axes: Floats, room: Box) -> tuple[Floats, float]:
     """Middle of the new parts in the picture's plane, and the scale at which they fit, (2,)."""
-    least, most = _reach(shown, shown.keys(), axes)
-    low, high = _reach(shown, new, axes)
+    least, most = _reach(_corners(shown, shown.keys()), axes)
+    low, high = _reach(_corners(shown, new), axes)
     size = np.maximum(high - low, CONTEXT * (most - least))
     space = np.array([room[2] - room[0], room[3] - room[1]])
     return (low + high) / 2, float(FILLED * (space / np.maximum(size, 1.0)).min())
 
 
-def _reach(bodies: Bodies, names: Iterable[str], axes: Floats) -> tuple[Floats, Floats]:
-    points = np.vstack([bodies[name].vertices for name in sorted(names)]) @ axes[:2].T
-    return points.min(axis=0), points.max(axis=0)
+def _corners(bodies: Bodies, names: Iterable[str]) -> Floats:
+    return np.vstack([bodies[name].vertices for name in sorted(names)])
+
+
+def _reach(corners: Floats, axes: Floats) -> tuple[Floats, Floats]:
+    points = axes[:2] @ corners.T
+    return points.min(axis=1), points.max(axis=1)
 
 
 def _placing(origin: Floats, scale: float) -> Callable[[Point], Point]:
@@ -197,11 +201,12 @@ def _best_eye(bodies: Bodies, rays: RayMeshIntersector, groups: list[list[str]])
     names = sorted(bodies)
     owner = np.repeat(np.arange(len(names)), [len(bodies[name].faces) for name in names])
     numbers = [[names.index(name) for name in group] for group in groups]
+    corners = _corners(bodies, bodies)
     eyes, worth, seen = [], [], []
     for (elevation, value), azimuth in product(ELEVATIONS.items(), AZIMUTHS):
         turn, up = np.radians(azimuth), np.radians(elevation)
         eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
-        counts = np.bincount(_seen(rays, owner, bodies, eye), minlength=len(names))
+        counts = np.bincount(_seen(rays, owner, corners, eye), minlength=len(names))
         eyes.append(eye)
         worth.append(value * (SQUARE_WORTH if azimuth % SQUARE_DEG == 0 else 1.0))
         seen.append([max(counts[group]) for group in map(np.array, numbers)])
@@ -210,14 +215,14 @@ def _best_eye(bodies: Bodies, rays: RayMeshIntersector, groups: list[list[str]])
     return eyes[int(np.argmax(scores * np.array(worth)))]
 
 
-def _seen(rays: RayMeshIntersector, owner: Ints, bodies: Bodies, eye: Floats) -> Ints:
-    """Numbers of the bodies that a grid of rays from a direction meets first."""
+def _seen(rays: RayMeshIntersector, owner: Ints, corners: Floats, eye: Floats) -> Ints:
+    """Numbers of the bodies, of all corners, that a grid of rays from a direction meets first."""
     axes = axes_toward(eye)
-    low, high = _reach(bodies, bodies, axes)
+    low, high = _reach(corners, axes)
     step = float((high - low).max()) / GRID
     x, y = (np.arange(low[k] + step / 2, high[k], step) for k in (0, 1))
     flat = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
-    far = max(float((one.vertices @ eye).max()) for one in bodies.values()) + 1.0
+    far = float((corners @ eye).max()) + 1.0
     start = flat @ axes[:2] + far * eye
     hit = rays.intersects_first(start, np.broadcast_to(-eye, start.shape))
     return np.asarray(owner[hit[hit >= 0]])

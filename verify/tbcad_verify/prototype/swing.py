@@ -20,7 +20,7 @@ SEARCH_MM = 8.0  # larger clearances are all reported as this
 MIN_STEP_RAD = np.radians(0.5)  # between two samples, however near things are
 TOUCH_MM3 = 0.01
 BALL_SEGMENTS = 64
-GRAIN_MM = 2.0  # longest edge between points on surfaces
+GRAIN_MM = 3.0  # longest edge between points on surfaces
 # Points of two surfaces may be farther apart than these by this: no point of a facet is farther
 # from a corner than 1/sqrt(3) of its longest edge.
 BETWEEN_MM = 2 * GRAIN_MM / float(np.sqrt(3))

@@ -46,7 +46,7 @@ BELTS, SECTORS = 12, 12  # patches of equal area on the object, in height and ro
 RATIO = 4.0
 # From so far below the horizon on do virtual cameras see a surface at 60 degrees from its normal.
 LOWEST = -np.sin(np.radians(60.0))
-ROWS = 4  # one row of pixels of so many is followed for glare
+ROWS = 8  # one row of pixels of so many is followed for glare
 GLARE = 0.5  # % of the pixels in use
 PLACE_MM = 0.1  # of an LED from the ring's face, across and along
 PLAY_MM = 1.0  # of the lens in the ring, on the diameter
@@ -243,8 +243,9 @@ def glare(lamps: ShellLamps, sensor: SensorScene) -> tuple[int, int]:
         mirror = np.where(label >= 0, setup.owner()[label], -1)
         some = np.flatnonzero(mirror >= 0)
         point, out = _again(setup.mirrors.take(mirror[some]), start[:, some], way[:, some])
-        free = first_hits(setup.scene, point + LIFT_MM * out, out) < 0
-        bright += int(_meets(lamps, point[:, free], out[:, free]).sum())
+        meets = _meets(lamps, point, out)  # before rays are traced: few do
+        point, out = point[:, meets], out[:, meets]
+        bright += int((first_hits(setup.scene, point + LIFT_MM * out, out) < 0).sum())
     return useful, bright
 
 

@@ -38,7 +38,7 @@ class PixelTally:
     pixels: Ints  # (M,) per mirror, whose reflected ray meets the capture sphere unhindered
     blocked: Ints  # (M,) per mirror, whose reflected ray is stopped before the capture sphere
     blockers: Ints  # (B,) facets that stop them, each once
-    on_mirrors: int  # pixels that see any part of this camera's mirrors
+    on_mirrors: int  # pixels that see any part of this camera's mirrors, of one in `SAMPLED`
     twice: int  # of those, how many rays meet another mirror after the first
     nearest: Floats  # (M,) minimum distance of useful camera-to-mirror rays from the origin, mm
     # (P,) distance at the object between the rays off facets and off fitted surfaces, for one
@@ -75,19 +75,20 @@ def trace_rows(sensor: SensorScene, first: int, last: int) -> PixelTally:
     miss = nearest_to_origin(lines)
     distance = norm(miss)
     useful = distance <= sensor.setup.radius
-    second, stopped = _second(sensor, lines, miss, distance, useful)
+    sampled = (first * sensor.camera.width + on) % SAMPLED == 0
+    second, stopped = _second(sensor, lines, miss, distance, useful, useful | sampled)
     clear = np.flatnonzero(useful & ~stopped)
     on_object = mirror[clear]
     distance = distance_before_mirror(sensor.seen, np.take(d, clear, axis=1), lines.reach[clear])
     nearest = np.full(len(sensor.setup.export.mirrors), np.inf)
     np.minimum.at(nearest, on_object, distance)
-    some = clear[(first * sensor.camera.width + on[clear]) % SAMPLED == 0]
+    some = clear[sampled[clear]]
     return PixelTally(
         np.bincount(on_object, minlength=len(sensor.setup.export.mirrors)),
         np.bincount(mirror[stopped], minlength=len(sensor.setup.export.mirrors)),
         np.unique(second[stopped]).astype(np.int64),
-        on.size,
-        int((sensor.other[second] & ~stopped).sum()),
+        int(sampled.sum()),
+        int((sensor.other[second] & ~stopped & sampled).sum()),
         nearest,
         _spread(sensor, facet[some], *(np.take(x, some, axis=1) for x in (d, lines.toward, miss))),
     )
@@ -99,11 +100,17 @@ def _second(
     miss: Floats,
     distance: Floats,
     useful: NDArray[np.bool_],
+    asked: NDArray[np.bool_],
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """The next facet along reflected rays, and which useful rays it stops before the object."""
+    """The next facet along reflected rays, and which useful rays it stops before the object.
+
+    -1 where there is none, and where it is not asked for.
+    """
     length = norm(lines.toward)
     start = lines.point + (LIFT_MM / length) * lines.toward
-    second = first_hits(sensor.setup.scene, start, lines.toward)
+    second, some = np.full(asked.size, -1, dtype=np.int32), np.flatnonzero(asked)
+    ways = np.take(start, some, axis=1), np.take(lines.toward, some, axis=1)
+    second[some] = first_hits(sensor.setup.scene, *ways)
     stopped = np.zeros(second.size, dtype=np.bool_)
     hit = np.flatnonzero(useful & (second >= 0))
     toward, begin = np.take(lines.toward, hit, axis=1), np.take(start, hit, axis=1)
