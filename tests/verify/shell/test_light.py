@@ -70,7 +70,7 @@ def test_pixel_counts_against_brute_force(
     # Only pixels on the very edge of a cell may differ: the mesh has chords for arcs.
     assert np.abs(found - expected).max() <= 2
     assert found.sum() > 4000
-    assert abs(tally.on_mirrors - (mirror >= 0).sum()) < 60
+    assert abs(tally.on_mirrors - (mirror[:: light.SAMPLED] >= 0).sum()) < 20
     assert tally.blocked.sum() == 0
 
 
