@@ -4,7 +4,7 @@ Factors and vertex colours are light, pictures sRGB (3.9).
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,15 @@ from scipy.spatial.transform import Rotation
 from tbcad.common.figure_files import srgb, srgb_light
 from tbcad.errors import InputError
 from tbcad.light.simulate.object_files.contents import (
+    AGAIN,
+    BESIDE,
+    ROUNDING,
+    Fault,
     ObjectFile,
     ObjectPart,
     even,
+    in_range,
+    range_text,
     texture,
     uri_bytes,
     without_facets,
@@ -46,9 +52,10 @@ CUT_OFF = "one of its buffers is cut off: copy it again"
 MOST_NODES = 100_000
 READ = {DRACO, TRANSFORM, WEBP, "KHR_mesh_quantization"}
 ONLY_LOOKS = "KHR_materials_"  # gloss, glass, cloth ...: of the surface, not of its colour
+PNG = "textures as PNG"
 REMEDY = {
     "EXT_meshopt_compression": "gltfpack without -c, or gltf-transform copy",
-    "KHR_texture_basisu": "gltf-transform with textures as PNG",
+    "KHR_texture_basisu": f"gltf-transform with {PNG}",
 }
 AS_MODELLED = "are left out: it stands as it was modelled"
 Json = dict[str, Any]
@@ -95,6 +102,25 @@ class GltfFile:
         if self.document["accessors"][number].get("normalized") and found.dtype.kind in "iu":
             return np.maximum(found / np.iinfo(found.dtype).max, -1.0)
         return found.astype(np.float64)
+
+    def material(self, number: int | None) -> Json:
+        """A material by its number; of none one that says nothing."""
+        if number is not None and not 0 <= number < len(self.document.get("materials", [])):
+            raise InputError(f"it names material {number}, which it does not have: {AGAIN}")
+        found: Json = {} if number is None else self.document["materials"][number]
+        return found
+
+    def factor(
+        self, holder: Json, key: str, default: Sequence[float] | float, high: float = 1.0
+    ) -> Floats:
+        """A factor from 0 on, () or (n,); as it is when nothing is said, and a fault, if bad."""
+        said = holder.get(key, default)
+        numbers = said if isinstance(said, list | tuple) else [said]
+        found = in_range(numbers, [np.size(default)], 0.0, high + ROUNDING)
+        if found is None:
+            allowed = range_text(0.0, high) + (f", {np.size(default)} times" * (np.ndim(default)))
+            self.notes.append(Fault(f"{key} is {said!s:.40}, allowed is {allowed}: {AGAIN}"))
+        return np.reshape(default if found is None else found, np.shape(default)).astype(float)
 
     def _table(self, at: Json, kind: np.dtype[Any], count: int, width: int) -> Values:
         step = self.document["bufferViews"][at["bufferView"]].get("byteStride", 0)
@@ -248,10 +274,12 @@ def _coloured(
     file: GltfFile, part: ObjectPart, number: int | None, attributes: dict[str, Floats]
 ) -> ObjectPart:
     """A part with the colours of a material and of its corners, multiplied."""
-    material = {} if number is None else file.document["materials"][number]
-    factor, reference = _base(material)
+    material = file.material(number)
+    factor, reference = _base(file, material)
     _note_left_out(file, material, factor)
     corner = attributes.get("COLOR_0")
+    if corner is not None and not np.isfinite(corner).all():
+        raise InputError("its vertex colours are not finite: repair the mesh")
     if corner is not None and corner.shape[1] > 3 and (corner[:, 3] < 1).any():
         file.notes.append("its transparency is left out")
     picture = None if reference is None else _picture(file, reference, factor[:3])
@@ -271,19 +299,18 @@ def _coloured(
     return replace(part, colours=shares, source=source)
 
 
-def _base(material: Json) -> tuple[Floats, Json | None]:
+def _base(file: GltfFile, material: Json) -> tuple[Floats, Json | None]:
     """Factor (4,), light, and the reference to a texture."""
-    base = material.get("pbrMetallicRoughness", {})
-    factor, found = base.get("baseColorFactor"), base.get("baseColorTexture")
+    base, name = material.get("pbrMetallicRoughness", {}), "baseColor"
     glossy = material.get("extensions", {}).get(GLOSSY)
     if glossy is not None and "pbrMetallicRoughness" not in material:
-        factor, found = glossy.get("diffuseFactor"), glossy.get("diffuseTexture")
-    return np.array(factor or (1, 1, 1, 1), dtype=np.float64), found
+        base, name = glossy, "diffuse"
+    return file.factor(base, f"{name}Factor", (1, 1, 1, 1)), base.get(f"{name}Texture")
 
 
 def _note_left_out(file: GltfFile, material: Json, factor: Floats) -> None:
     file.notes += [note for key, note in LEFT_OUT.items() if key in material]
-    if any(value > 0 for value in material.get("emissiveFactor", ())):
+    if (file.factor(material, "emissiveFactor", (0, 0, 0)) > 0).any():
         file.notes.append(LEFT_OUT["emissiveTexture"])
     mode = material.get("alphaMode", "OPAQUE")
     if mode == "MASK" or (mode != "OPAQUE" and factor[3] < 1):
@@ -294,20 +321,22 @@ def _finish(
     file: GltfFile, number: int | None, attributes: dict[str, Floats], part: ObjectPart
 ) -> Finish | None:
     """How a part shines; what its material does not say is rough metal (3.9.2)."""
-    material = {} if number is None else file.document["materials"][number]
+    material = file.material(number)
     more, facets = material.get("extensions", {}), len(part.faces)
     if number is None or UNLIT in more:
         return None
     base, old = material.get("pbrMetallicRoughness", {}), more.get(GLOSSY)
     if old is not None and not base:
-        roughness = 1 - float(old.get("glossinessFactor", 1))
-        return Finish.even(facets, roughness, 0.0, old.get("specularFactor", (1, 1, 1)))
-    f0 = dielectric_f0(float(more.get(IOR, {}).get("ior", 1.5)))
-    told = more.get(SPECULAR, {})
-    tint = np.array(told.get("specularColorFactor", (1, 1, 1)), dtype=np.float64)
-    shares = np.minimum(f0 * tint, 1) * float(told.get("specularFactor", 1))
+        roughness = 1 - file.factor(old, "glossinessFactor", 1)
+        return Finish.even(facets, roughness, 0.0, file.factor(old, "specularFactor", (1, 1, 1)))
+    index, told = file.factor(more.get(IOR, {}), "ior", 1.5, np.inf), more.get(SPECULAR, {})
+    if 0 < index < 1:  # 0: reflects as metals do
+        file.notes.append(Fault(f"ior is {index:g}, allowed is 0, or 1 and more: {AGAIN}"))
+    tint = file.factor(told, "specularColorFactor", (1, 1, 1), np.inf)
+    shares = np.minimum(dielectric_f0(float(index)) * tint, 1)
+    shares = shares * file.factor(told, "specularFactor", 1)
     map_of = _roughness_and_metal(file, base.get("metallicRoughnessTexture"), attributes, part)
-    rough, metal = (float(base.get(f"{name}Factor", 1)) for name in ("roughness", "metallic"))
+    rough, metal = (file.factor(base, f"{name}Factor", 1) for name in ("roughness", "metallic"))
     return Finish.even(facets, rough * map_of[:, 0], metal * map_of[:, 1], shares)
 
 
@@ -350,13 +379,14 @@ def _source(file: GltfFile, reference: Json) -> tuple[Json | None, str]:
 def _image(file: GltfFile, reference: Json) -> Bytes | None:
     image, name = _source(file, reference)
     if image is None:
-        file.notes.append("one of its textures is of a kind that is not read")
+        kind = f"a texture of it is of a kind that is not read: write it with {PNG}"
+        file.notes.append(Fault(kind))
         return None
     try:
         inside = "bufferView" in image
         data = file.view(image["bufferView"]) if inside else uri_bytes(file.path, image["uri"])
     except InputError as error:
-        file.notes.append(f"its texture {error}")
+        file.notes.append(Fault(f"its texture {error}: {BESIDE}"))
         return None
     return texture(data, name, file.notes)
 
@@ -369,16 +399,25 @@ def _coordinates(
     number = transform.get("texCoord", reference.get("texCoord", 0))
     given = attributes.get(f"TEXCOORD_{number}")
     if given is None:
-        file.notes.append("it names a texture, but has no texture coordinates")
+        file.notes.append(Fault(f"it names a texture, but has no texture coordinates: {AGAIN}"))
         return None
-    turn = float(transform.get("rotation", 0.0))
+    turn = _finite(transform, "rotation", 0.0)
     cosine, sine = np.cos(turn), np.sin(turn)
-    scaled = given * np.array(transform.get("scale", (1, 1)), dtype=np.float64)
+    scaled = given * _finite(transform, "scale", (1, 1))
     uv = scaled @ np.array([[cosine, -sine], [sine, cosine]])
-    uv += np.array(transform.get("offset", (0, 0)), dtype=np.float64)
+    uv += _finite(transform, "offset", (0, 0))
     sampler = file.document["textures"][reference["index"]].get("sampler")
     if sampler is not None and not ((uv >= -FULL_UV) & (uv <= 1 + FULL_UV)).all():
         modes = file.document["samplers"][sampler]
         if {modes.get("wrapS"), modes.get("wrapT")} & {CLAMP, MIRRORED}:
             file.notes.append("a texture that is clamped or mirrored beyond its edge repeats")
     return np.column_stack([uv[:, 0], 1 - uv[:, 1]])[part.faces]
+
+
+def _finite(transform: Json, key: str, default: Sequence[float] | float) -> Floats:
+    """Numbers of a texture's transform, () or (2,); InputError: not so many, or not finite."""
+    said = transform.get(key, default)
+    numbers = said if isinstance(said, list | tuple) else [said]
+    if in_range(numbers, [np.size(default)], -np.inf, np.inf) is None:
+        raise InputError(f"{key} of a texture is {said!s:.40}, allowed are finite numbers: {AGAIN}")
+    return np.reshape(numbers, np.shape(default)).astype(float)
