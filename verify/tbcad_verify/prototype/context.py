@@ -125,7 +125,7 @@ class PrototypeContext:
     def stop(self) -> Ints:
         """(m,) stop at which it does, from 0. Unknown: there is no such stop."""
         stop = self.prototype.plan.stop[self.plan_rows] - 1
-        if (stop >= len(self.prototype.stops)).any():
+        if ((stop < 0) | (stop >= len(self.prototype.stops))).any():
             raise Unknown("the plan names stops that do not exist")
         return stop
 
