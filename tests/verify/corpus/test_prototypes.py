@@ -40,7 +40,9 @@ def test_what_balls_show_is_what_the_tolerance_model_says(good_prototype: Path) 
     expected = prototype_result(model, exact).calibrated_coverage[0, : found.size]
     whole = ~measured.context.halved
     assert np.linalg.norm(measured.context.sag_at_stops, axis=2).max() > 0.2
-    assert found[whole] == pytest.approx(expected[whole], abs=0.01)
+    # Corners between two of the 96 directions of an outline are not seen.
+    assert found[whole] == pytest.approx(expected[whole], abs=0.05)
+    assert found[whole].min() == pytest.approx(expected[whole].min(), abs=5e-3)
 
 
 def tied_list(data: bytes) -> bytes:
