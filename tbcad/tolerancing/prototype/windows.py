@@ -28,7 +28,13 @@ from tbcad.core.optics.sphere_forms import (
     powered_radius,
 )
 from tbcad.core.optics.windows import cell_windows
-from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, PrototypeRun, prototype_runs
+from tbcad.light.simulate.prototype.run import (
+    HALF_TURN,
+    Plan,
+    PrototypeRun,
+    prototype_runs,
+    sight_frames,
+)
 from tbcad.light.simulate.scene.reflector import Reflector
 from tbcad.tolerancing.montecarlo.builds import CameraCoverage, CoverageResult
 from tbcad.tolerancing.montecarlo.coverage import virtual_camera_numbers
@@ -305,22 +311,16 @@ def cap_rotations(plan: Plan, tilt: Floats) -> Rotation:
 
 
 def calibrated_pose(model: PrototypeWindows, half: int, pose: RunPose) -> RunPose:
-    """The same with windows moved to the actual balls, whose middles show the object's centre."""
-    run = model.runs[half]
-    lens = model.axes @ _shortest_rotations(unit(run.middle @ model.axes), pose.highlight)
-    return replace(pose, lens=lens)
+    """The same with windows as a merge puts them on the actual balls (`prototype_run`)."""
+    middle = unit(model.runs[half].middle @ model.axes)
+    before = sight_frames(middle, model.pinhole)
+    after = sight_frames(pose.highlight, pose.pinhole)
+    return replace(pose, lens=model.axes @ np.swapaxes(before, 1, 2) @ after)
 
 
 def calibrated_poses(model: PrototypeWindows, draws: PrototypeDraws, build: int) -> list[RunPose]:
     """Both runs of one build with their windows moved to the actual balls."""
     return [calibrated_pose(model, k, run_pose(model, draws, build, k)) for k in (0, 1)]
-
-
-def _shortest_rotations(start: Floats, end: Floats) -> Floats:
-    """Matrices (m, 3, 3) that turn unit vectors (m, 3), as rows, onto others the shortest way."""
-    axis = np.cross(start, end)
-    skew = np.cross(np.eye(3), axis[:, None])  # row x becomes x cross axis
-    return np.asarray(np.eye(3) - skew + skew @ skew / (1 + dot(start, end))[:, None, None])
 
 
 def prototype_result(model: PrototypeWindows, draws: PrototypeDraws) -> PrototypeResult:

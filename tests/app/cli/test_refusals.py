@@ -28,6 +28,9 @@ GIVEN = {
     "none.csv": LAMP,
     "inside.csv": LAMP + "1,2,3\n",
     "named.csv": "x,y,z\n1,2,300\n",
+    "bad.mtl": "newmtl m\nPr 0.3\nNs shiny\n",
+    "bad.obj": "mtllib bad.mtl\nusemtl m\nv 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n",
+    "lost.obj": "mtllib lost.mtl\nusemtl m\nv 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n",
     "lamps.csv": LAMP + "1,2,300\n",
     "sky.hdr": "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n" + 8 * "@@@\x7f",
 }

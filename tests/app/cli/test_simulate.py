@@ -125,14 +125,14 @@ def test_capture_is_named_after_its_object(
 
 
 def test_capture_says_how_a_file_was_taken(record: Path, tmp_path: Path, cli: Command) -> None:
-    """A file of millimetres, y up, whose texture is lost."""
-    (tmp_path / "a.mtl").write_text("newmtl m\nKd 1 0.5 0\nmap_Kd C:\\lost.png\n")
+    """A file of millimetres, y up, with a map that is not converted."""
+    (tmp_path / "a.mtl").write_text("newmtl m\nKd 1 0.5 0\nmap_Bump C:\\lost.png\n")
     (tmp_path / "a.obj").write_text(
         "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 9 0 0\nv 0 9 0\nvt 0 0\nf 1/1 2/1 3/1\n"
     )
     out, mesh = tmp_path / "out", tmp_path / "a.obj"
     printed = cli("capture", record, "--object", mesh, "--up", "y", "--out", out, "--json")
-    lost = "its texture C:\\lost.png is not in the folder of the mesh"
+    lost = "its map_Bump is left out"
     assert f"tbcad: warning: a.obj: {lost}" in printed.err
     assert "a.obj: unit mm, y up, colours: colours of materials (Kd)" in printed.err
     colours = "colours of materials (Kd)"

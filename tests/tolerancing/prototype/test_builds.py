@@ -10,7 +10,13 @@ from tbcad.core.geometry.vectors import norm, perpendicular_axes, unit
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.windows import cell_windows
 from tbcad.core.spec.load import load_spec
-from tbcad.light.simulate.prototype.run import HALF_TURN, Plan, PrototypeRun, prototype_runs
+from tbcad.light.simulate.prototype.run import (
+    HALF_TURN,
+    Plan,
+    PrototypeRun,
+    prototype_run,
+    prototype_runs,
+)
 from tbcad.light.simulate.scene.reflector import reflectors
 from tbcad.prototype.balls.layout import PrototypeLayout, prototype_layout
 from tbcad.tolerancing.montecarlo.builds import simulate
@@ -21,6 +27,7 @@ from tbcad.tolerancing.prototype.windows import (
     PrototypeDraws,
     PrototypeResult,
     PrototypeWindows,
+    calibrated_poses,
     draw_prototypes,
     powered_plan,
     prototype_model,
@@ -99,6 +106,19 @@ def pictures(runs: Runs) -> list[Picture]:
         axes = view.axes[:2].T
         result.append((sides.mirror, way @ axes / (way @ view.axes[2])[..., None]))
     return result
+
+
+def test_calibrated_windows_are_those_of_a_merge(
+    small_design: MirrorDesign, model: PrototypeWindows, runs: Runs
+) -> None:
+    """As the run of a machine has them, whose balls and camera are elsewhere."""
+    run, pose = runs[0], calibrated_poses(model, draws_of(model, 1, **SPREAD), 0)[0]
+    balls, camera = run.balls.copy(), replace(run.camera, pinhole=pose.pinhole)
+    balls[run.stop, run.ball, :4] = np.column_stack([pose.centre, pose.radius])
+    merged = prototype_run(reflectors(small_design)[0], model.plan, 0, camera, balls)
+    found = run.window_rotation @ model.axes.T @ pose.lens
+    assert found == pytest.approx(merged.window_rotation, abs=1e-9)
+    assert np.abs(found - run.window_rotation).max() > 1e-3
 
 
 def slow(
@@ -210,6 +230,13 @@ class TestMotions:
         assert result.calibrated_coverage == pytest.approx(exact, abs=1e-6)
         assert result.calibrated_offset.max() < 1e-6
         assert result.coverage.min() < exact.min() - 1
+
+    def test_known_turns_about_the_axis_cost_nothing(self, model: PrototypeWindows) -> None:
+        """Pinhole and object lie on it: the whole picture of a mirror turns."""
+        exact = prototype_result(model, draws_of(model, 1))
+        turned = prototype_result(model, draws_of(model, 1, rotation_angle=Error(5e-3)))
+        assert turned.calibrated_coverage == pytest.approx(exact.coverage, abs=1e-6)
+        assert turned.coverage.min() < exact.coverage.min() - 1
 
     def test_a_known_tilt_of_a_cap_costs_little(self, model: PrototypeWindows) -> None:
         """What the limit of the caps' tilt is taken from: a share of the coverage once known."""

@@ -21,9 +21,9 @@ import manifold3d
 from tbcad_verify.mesh.rays import RayScene
 from tbcad_verify.prototype.bodies import Bodies, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.light.ball_views import ray_transfer
 from tbcad_verify.prototype.light.lamp_light import EdgedBodies
 from tbcad_verify.prototype.light.pinhole_cells import mirror_spheres
+from tbcad_verify.prototype.light.windows import ray_transfer
 from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
@@ -173,7 +173,8 @@ def _traced_key(measured: MeasuredPrototype, *_: object) -> object:
     """All that the light of the balls depends on."""
     context = measured.context
     return (
-        *(measured.centre, measured.radius, measured.body, context.angle, context.ball),
+        *(measured.centre, measured.radius, measured.seated, context.angle, context.ball),
+        *(context.stop, context.sag_at_stops),
         *(measured.rotating.scene, measured.fixed.scene),
         *(context.export.mirrors.columns("ux", 15), context.camera),
         *(context.export.target_mm, context.export.foot_z_mm),
@@ -182,7 +183,7 @@ def _traced_key(measured: MeasuredPrototype, *_: object) -> object:
 
 def _rays_key(measured: MeasuredPrototype) -> object:
     transfer = ray_transfer(measured)
-    arrays = transfer.merged, transfer.on_base, transfer.ball
+    arrays = transfer.merged, transfer.held, transfer.ball
     return _traced_key(measured), arrays, mirror_spheres(measured.context)
 
 

@@ -10,22 +10,25 @@ import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
+from scipy.spatial.transform import Rotation
 from tbcad_verify.mesh.mesh import Mesh, join_meshes, mass_properties
 from tbcad_verify.mesh.stl import parse
+from tbcad_verify.mesh.surfaces import nearest_on_rays
 from tbcad_verify.mesh.vectors import cross, dot, norm
-from tbcad_verify.prototype import balls_apart, sag_checks, seats, swing
+from tbcad_verify.prototype import balls_apart, bodies, sag_checks, seats, swing
 from tbcad_verify.prototype.assembly import assembly_meshes, part_step_checks
 from tbcad_verify.prototype.bodies import MeasuredPrototype, measure_prototype
 from tbcad_verify.prototype.caps import measure_cap
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.light import ball_views, pinhole_cells
+from tbcad_verify.prototype.light import ball_views, pinhole_cells, windows
 from tbcad_verify.prototype.measured_parts import MeasuredPart, measure_part, of_roles
 from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
-from tbcad_verify.record.prototype import RECORD
+from tbcad_verify.record.prototype import RECORD, SagTable
 from tbcad_verify.report.checks import check_names
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.step.step_file import StepFile, examine_all, load, read_step_files
+from tbcad_verify.types import Floats
 
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
@@ -133,26 +136,6 @@ def test_balls_are_where_weight_brings_them_from_their_seats(measured: MeasuredP
     assert sag_checks._beside(name, measured.context, there, sag).passed
 
 
-def test_all_that_turns_is_moved_as_weight_moves_the_balls(
-    context: PrototypeContext, measured: MeasuredPrototype
-) -> None:
-    """A ray straight down meets the base so much lower."""
-    balls = context.prototype.balls
-    lower = {"sag_z_mm": np.full(len(balls), -0.5), "cz": balls.cz - 0.5}
-    balls = balls.model_copy(update=lower)
-    record = context.prototype.model_copy(update={"balls": balls})
-    sagged = measured_of(replace(context, prototype=record))
-    shift = np.array([[0.0], [0.0], [-0.5]])
-    assert sagged.centre == pytest.approx(measured.centre + shift)
-    assert sagged.seated == pytest.approx(measured.seated)
-    down = np.tile([[0.0], [0.0], [-1.0]], measured.body.shape[1])
-    above = measured.body + 50 * -down
-    (hit, before), (same, after) = (one.rotating.first(above, down) for one in (measured, sagged))
-    assert (hit >= 0).any()
-    assert same.tolist() == hit.tolist()
-    assert after[hit >= 0] == pytest.approx(before[hit >= 0] + 0.5, abs=1e-4)
-
-
 def test_pads_are_found_without_the_contacts_being_right(context: PrototypeContext) -> None:
     base = base_of(context)
     recorded = context.prototype
@@ -213,34 +196,89 @@ def test_first_mirrors_by_brute_force(context: PrototypeContext, rays_together: 
         assert found[k] == (which if good else -1)
 
 
+def hung(measured: MeasuredPrototype, moved: Floats) -> MeasuredPrototype:
+    """The same with displacements (S, K, 3) by weight, in the ground's frame, mm."""
+    stop, ball = np.indices(moved.shape[:2]).reshape(2, -1) + 1
+    columns = [moved[..., x].ravel() for x in range(3)] + [np.zeros(stop.size)] * 9
+    names = [name for name in SagTable.model_fields if name.endswith("_mm")]
+    table = SagTable.model_construct(stop=stop, ball=ball, **dict(zip(names, columns, strict=True)))
+    record = measured.context.prototype.model_copy(update={"sag": table})
+    return replace(measured, context=replace(measured.context, prototype=record))
+
+
+def places(measured: MeasuredPrototype) -> Floats:
+    """Balls in their seats at the stops, (S, K, 3)."""
+    angles = measured.context.prototype.stops.angle.tolist()
+    return np.stack([turned(measured.seated.T, angle) for angle in angles])
+
+
+def coverage_of(measured: MeasuredPrototype) -> Floats:
+    cells = pinhole_cells.cell_outlines(pinhole_cells.mirror_spheres(measured.context))
+    transfer = windows.ray_transfer(measured)
+    return ball_views._coverage(transfer, *ball_views.ended_on_balls(transfer, cells))
+
+
 def test_the_window_goes_along_with_its_ball(
     context: PrototypeContext, measured: MeasuredPrototype
 ) -> None:
-    """Each mirror's middle is moved to its ball's apex, which shows the origin."""
-    transfer = ball_views.ray_transfer(measured)
+    """Each mirror's middle is moved to its ball's highlight, which shows the origin."""
     shell = pinhole_cells.mirror_spheres(context)
     chief = pinhole_cells.cell_outlines(shell).chief
-    _, lines = transfer.reflected(np.arange(chief.shape[1]), chief)
+    moved = np.random.default_rng(1).normal(0, 0.5, places(measured).shape)
+    for some, tolerance in ((measured, 0.02), (hung(measured, moved), 1e-9)):
+        transfer = windows.ray_transfer(some)
+        _, lines = transfer.reflected(np.arange(chief.shape[1]), chief)
+        away = nearest_on_rays(lines)
+        assert np.linalg.norm(away, axis=0).max() < tolerance
     apex = context.prototype.balls.columns("px", 3)[:, context.ball]
-    np.testing.assert_allclose(lines.point, apex, atol=1e-3)
-    away = (
-        lines.point
-        - (lines.point * lines.toward).sum(axis=0) / (lines.toward**2).sum(axis=0) * lines.toward
-    )
-    assert np.linalg.norm(away, axis=0).max() < 0.02
+    there = context.base_rotation(context.angle).apply(apex.T).T
+    _, lines = windows.ray_transfer(measured).reflected(np.arange(chief.shape[1]), chief)
+    np.testing.assert_allclose(lines.point, there, atol=0.02)
 
 
-def test_coverage_by_rays_on_a_fine_outline(
+def test_a_base_that_yields_about_its_axis_shows_the_same(measured: MeasuredPrototype) -> None:
+    """Pinhole and object lie on the axis, so all but the picture's turn stays, to first order."""
+    moved = np.cross(3e-4 * measured.context.frame[0], places(measured))
+    assert np.linalg.norm(moved, axis=2).max() > 0.02
+    assert coverage_of(hung(measured, moved)) == pytest.approx(coverage_of(measured), abs=3e-3)
+
+
+def test_caps_that_turn_too_much_show_too_little(
     context: PrototypeContext, measured: MeasuredPrototype
 ) -> None:
-    """One mirror by a plain loop over many directions, its ball turned and not the rays."""
-    shown = ball_views.ball_views(measured, ball_views.pixel_rays(measured))
+    """At one stop alone, and a flat cap, whose sphere's centre is far behind its seat."""
+    cap = int(context.prototype.balls.cap.argmax())
+    normal, radius = context.prototype.balls.columns("nx", 3), measured.radius.copy()
+    radius[cap] = 60.0
+    centre = measured.centre + (measured.radius - radius) * normal
+    flat = replace(measured, radius=radius, centre=centre)
+    before, moved = coverage_of(flat), np.zeros(places(flat).shape)
+    here = context.stop == context.stop[context.ball == cap][0]
+    moved[context.stop[here]] = -0.06 * np.cross(context.frame[2], places(flat)[context.stop[here]])
+    after = coverage_of(hung(flat, moved))
+    assert after[~here] == pytest.approx(before[~here], abs=1e-9)
+    assert (after[here] < before[here] - 0.1).all()
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.5])
+def test_coverage_by_rays_on_a_fine_outline(
+    context: PrototypeContext, measured: MeasuredPrototype, weight: float
+) -> None:
+    """One mirror by a plain loop over many directions; weight moves balls, and turns the cap."""
+    seats = places(measured)
+    rigid = weight * np.array([0.02, -0.01, 0.015])
+    rest = np.random.default_rng(2).normal(0, 0.1 * weight, seats.shape)
+    for k, place in enumerate(seats):  # of which no motion is left
+        motion = bodies.rigid_motions(place)
+        rest[k] -= (motion @ np.linalg.pinv(motion) @ rest[k].ravel()).reshape(-1, 3)
+    some = hung(measured, np.cross(rigid, seats) + rest)
+    covered, transfer = coverage_of(some), windows.ray_transfer(some)
     edge = pinhole_cells.cell_outlines(pinhole_cells.mirror_spheres(context))
-    transfer = ball_views.ray_transfer(measured)
     for i in (5, 20, 40):
-        ball, angle = int(context.ball[i]), float(np.degrees(context.angle[i]))
+        ball, stop, angle = (int(context.ball[i]), int(context.stop[i]), context.angle[i])
         sphere = make_balls(SyntheticPrototype())[ball]
-        centre = turned(sphere.c, angle)
+        arm = Rotation.from_rotvec(rigid).apply(turned(sphere.c - sphere.b, np.degrees(angle)))
+        centre = (seats + np.cross(rigid, seats) + rest)[stop, ball] + arm
         least = np.inf
         middle = transfer.merged[:, :, i] @ edge.chief[:, i]
         for d in edge.direction[:, i].T[edge.is_edge[i]]:
@@ -256,7 +294,7 @@ def test_coverage_by_rays_on_a_fine_outline(
             out = way - 2 * (way @ normal) * normal
             at = point + max(-(point @ out), 0) * out
             least = min(least, 2 * float(np.linalg.norm(at)))
-        assert shown.coverage[i] == pytest.approx(least, rel=5e-3)
+        assert covered[i] == pytest.approx(least, rel=5e-3)
 
 
 @pytest.mark.parametrize(("turn", "meets"), [(0.0, True), (170.0, False)])

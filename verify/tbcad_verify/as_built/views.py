@@ -16,14 +16,14 @@ from tbcad_verify.mesh.surfaces import (
     prepare_for_rays,
     reflect,
 )
-from tbcad_verify.mesh.vectors import cross, dot, nearest_on_lines, norm, unit
+from tbcad_verify.mesh.vectors import nearest_on_lines, norm, unit
 from tbcad_verify.prototype.context import PrototypeContext
-from tbcad_verify.prototype.light.ball_views import ended_on_balls, outline_coverage, rotated
+from tbcad_verify.prototype.light.ball_views import ended_on_balls, outline_coverage
 from tbcad_verify.prototype.light.pinhole_cells import MirrorSpheres, cell_outlines
+from tbcad_verify.prototype.light.windows import highlights, rotated, sights, window_rotations
 from tbcad_verify.record.poses import ON_SEAM
 from tbcad_verify.types import Bools, Floats, Ints
 
-HALVINGS = 50
 HALF_TURN = np.array([[-1.0], [-1.0], [1.0]])
 """Turns points by 180 degrees about z, as the object is turned for the second run."""
 
@@ -99,8 +99,8 @@ def half_views(
     radius, pinhole = machine.radius[which], machine.camera.pinhole
     apex = highlights(pinhole, ball, radius, np.zeros(3))
     start = shell.apex if context.moved else half.designed[:, known]
-    before, after = _sight(start, shell.pinhole), _sight(apex, pinhole)
-    matrix = np.einsum("rim,rjm->ijm", after, before)
+    before, after = sights(start, shell.pinhole), sights(apex, pinhole)
+    matrix = window_rotations(before, after)
     normal = unit(apex - ball)
     surfaces = prepare_for_rays(pinhole, Surfaces(apex, normal, 1 / radius))
     # Neighbours of all mirrors bound the cells, measured or not.
@@ -154,37 +154,6 @@ def _taken(shell: MirrorSpheres, some: Ints) -> MirrorSpheres:
     )
 
 
-def _sight(apex: Floats, pinhole: Floats) -> Floats:
-    """(3, 3, m) rows: to each apex, at right angles to it in the plane of the origin, and third."""
-    ahead = unit(apex - pinhole[:, None])
-    across = unit(cross(ahead, np.broadcast_to(-pinhole[:, None], ahead.shape)))
-    return np.stack([ahead, cross(across, ahead), across])
-
-
 def _least(values: Floats, is_edge: Bools) -> Floats:
     """(m,) smallest of values (m * s,) on edges of cells (m, s)."""
     return np.asarray(np.where(is_edge, values.reshape(is_edge.shape), np.inf).min(axis=1))
-
-
-def highlights(pinhole: Floats, centre: Floats, radius: Floats, led: Floats) -> Floats:
-    """(3, m) points of spheres by which the way from a light (3,) to the pinhole is shortest.
-
-    They lie in the plane of centre, light and pinhole, between both, where the way's slope is zero.
-    """
-    to_led, to_pinhole = led[:, None] - centre, pinhole[:, None] - centre
-    first, between = unit(to_led), dot(to_led, to_pinhole) / (norm(to_led) * norm(to_pinhole))
-    second = unit(to_pinhole - dot(to_pinhole, first) * first)
-    low, high = np.zeros(radius.size), np.arccos(np.clip(between, -1, 1))
-
-    def point(angle: Floats) -> Floats:
-        return np.asarray(radius * (np.cos(angle) * first + np.sin(angle) * second))
-
-    def slope(angle: Floats) -> Floats:
-        along = -np.sin(angle) * first + np.cos(angle) * second
-        return dot(along, unit(point(angle) - to_led) + unit(point(angle) - to_pinhole))
-
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        falls = slope(middle) < 0
-        low, high = np.where(falls, middle, low), np.where(falls, high, middle)
-    return np.asarray(centre + point((low + high) / 2))

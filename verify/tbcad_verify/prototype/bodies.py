@@ -6,14 +6,13 @@ GLB, whose bodies are compared with the parts' own files.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from tbcad_verify.mesh.mesh import Mesh, indexed_mesh, join_meshes
 from tbcad_verify.mesh.rays import RayScene, build_scene, distances_to_planes, first_hits
-from tbcad_verify.mesh.surfaces import PreparedSurfaces, Surfaces, prepare_for_rays
 from tbcad_verify.mesh.vectors import unit
 from tbcad_verify.prototype.assembly import VIEWS, Shape
 from tbcad_verify.prototype.caps import MeasuredCap
@@ -151,19 +150,16 @@ def some_angles(context: PrototypeContext) -> Floats:
 
 @dataclass(frozen=True)
 class MeasuredPrototype:
-    """The prototype as its files define it, seen from its base at angle zero, under weight.
-
-    All that turns is moved by the recorded displacements of the balls on the mean over their
-    pictures. Pinhole and capture sphere lie on the axis, so they stay where they are.
-    """
+    """The prototype as its files define it, seen from its base at angle zero, without weight."""
 
     context: PrototypeContext  # the record
     centre: Floats  # (3, K) of the reflecting spheres, mm
     radius: Floats  # (K,) of them, mm
-    body: Floats  # (3, K) centres of the spheres that lie on the pads, mm
-    seated: Floats  # (3, K) the same without weight, mm
+    # (3, K) centres of the spheres that lie on the pads, and as weight has them on the mean over
+    # their pictures by the record, mm
+    seated: Floats
+    body: Floats
     body_radius: Floats  # (K,) mm
-    mirrors: PreparedSurfaces  # the reflecting spheres, for rays from the pinhole
     rotating: BodyScene  # base, caps, and what is fastened to them
     fixed: BodyScene  # all else
     # boards and rods of LEDs above the object, which are in the light and may hide some of it
@@ -179,15 +175,13 @@ def measure_prototype(
 ) -> MeasuredPrototype:
     """Put balls on their pads, and caps as they were measured; what is bought is as drawn.
 
-    Weight then moves balls and caps as recorded, and the rest as fits them best.
-
     Unknown: a centre, a cap or a mesh is not known.
     """
     balls = context.prototype.balls
     if missing := [seat.reason for seat in seats if seat.reason]:
         raise Unknown(missing[0])
-    body, radius = np.array([seat.centre for seat in seats]).T.copy(), balls.radius_mm.copy()
-    centre, body_radius = body.copy(), balls.body_radius_mm.copy()
+    seated, radius = np.array([seat.centre for seat in seats]).T.copy(), balls.radius_mm.copy()
+    centre, body_radius = seated.copy(), balls.body_radius_mm.copy()
     without = {*np.flatnonzero(balls.cap).tolist()} - {cap.ball for cap in caps}
     if without:
         raise Unknown(f"no part is the cap of ball {min(without) + 1}")
@@ -195,9 +189,6 @@ def measure_prototype(
         # The cap's body lies on the pads, wherever the cap's own file has it.
         centre[:, cap.ball] += cap.front.centre - cap.body.centre
         radius[cap.ball], body_radius[cap.ball] = cap.front.radius, cap.body.radius
-    centre, seated, moved = centre + balls.sag, body, _under_weight(context, body)
-    normal = unit(balls.columns("nx", 3))
-    surfaces = Surfaces(centre + radius * normal, normal, 1 / radius)
     bought = drawn.keys() - {*VIEWS, *OWN, *(part.part.name for part in parts)}
     bought = {name for name in bought if not name.startswith("ball_")}
     swung, above = turning(context, ()), upper_bodies(context)
@@ -207,29 +198,13 @@ def measure_prototype(
         context,
         centre,
         radius,
-        seated + balls.sag,
         seated,
+        seated + balls.sag,
         body_radius,
-        prepare_for_rays(context.pinhole, surfaces),
-        body_scene({name: moved(name, mesh) for name, mesh in turned.items()}),
+        body_scene(turned),
         body_scene({name: mesh for name, mesh in still.items() if name not in above}),
         body_scene({name: mesh for name, mesh in still.items() if name in above}),
     )
-
-
-def _under_weight(context: PrototypeContext, body: Floats) -> Callable[[str, Mesh], Mesh]:
-    """How a mesh is moved, by its name: a cap as its ball, all else as fits balls (3, K) best."""
-    balls, parts = context.prototype.balls, context.prototype.parts
-    fitted = np.linalg.lstsq(rigid_motions(body.T), balls.sag.T.ravel(), rcond=None)[0]
-    of_cap = {part.name: balls.sag[:, part.ball] for part in parts if part.role == "cap"}
-
-    def moved(name: str, mesh: Mesh) -> Mesh:
-        if name in of_cap:
-            return replace(mesh, points=mesh.points + of_cap[name])
-        by = np.cross(fitted[3:], mesh.points) + fitted[:3]
-        return replace(mesh, points=mesh.points + by)
-
-    return moved
 
 
 def rigid_motions(arm: Floats) -> Floats:

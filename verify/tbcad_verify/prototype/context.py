@@ -12,11 +12,13 @@ from tbcad_verify.mesh.vectors import axis_frame
 from tbcad_verify.record.export import Camera, Export
 from tbcad_verify.record.poses import ON_SEAM
 from tbcad_verify.record.prototype import Prototype
-from tbcad_verify.report.checks import Unknown
+from tbcad_verify.report.checks import Unknown, require
 from tbcad_verify.types import Bools, Floats, Ints
 
 # Of what caps are made of, g/cm^3: cured resins 1.15 to 1.2; aluminium alloys 2.70 (EN 573-3).
 CAP_DENSITIES = {"printed": 1.18, "turned": 2.70, "none": 0.0}
+
+OTHER_SAG = "sag.csv has other stops or balls"
 
 
 @dataclass(frozen=True)
@@ -118,3 +120,24 @@ class PrototypeContext:
     def angle(self) -> Floats:
         """(m,) base angle at which it does, radians."""
         return np.radians(self.prototype.plan.angle[self.plan_rows])
+
+    @property
+    def stop(self) -> Ints:
+        """(m,) stop at which it does, from 0. Unknown: there is no such stop."""
+        stop = self.prototype.plan.stop[self.plan_rows] - 1
+        if ((stop < 0) | (stop >= len(self.prototype.stops))).any():
+            raise Unknown("the plan names stops that do not exist")
+        return stop
+
+    @property
+    def sag_at_stops(self) -> Floats:
+        """(S, K, 3) displacements of the balls at the stops by weight, in the ground's frame, mm.
+
+        Those of sag.csv, else the means. Unknown: they are of other stops or balls.
+        """
+        sag, stops, balls = self.prototype.sag, self.prototype.stops, self.prototype.balls
+        if sag is None:
+            turns = self.base_rotation(np.radians(stops.angle)).as_matrix()
+            return np.asarray(balls.sag.T @ turns.swapaxes(1, 2))
+        moved = require(sag.moved((len(stops), len(balls), 3)), OTHER_SAG)
+        return np.asarray(moved.sum(axis=0))

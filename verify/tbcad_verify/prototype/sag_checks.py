@@ -15,7 +15,7 @@ from tbcad_verify.mesh.mesh import Mesh, join_meshes
 from tbcad_verify.prototype.assembly import Shape
 from tbcad_verify.prototype.bodies import MeasuredPrototype, rigid_motions
 from tbcad_verify.prototype.bricks import STEP_MM, Bricks, fill_bricks, shapes
-from tbcad_verify.prototype.context import PrototypeContext
+from tbcad_verify.prototype.context import OTHER_SAG, PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
 from tbcad_verify.report.checks import Check, CheckName, at_most, require
 from tbcad_verify.types import Floats
@@ -51,7 +51,7 @@ def checks(
     turn = context.base_rotation(np.radians(context.prototype.stops.angle)).as_matrix()
     down = np.array([0.0, 0.0, -1.0]) @ turn
     own = np.einsum("kab,sb->ska", _by_weight(context, parts, measured, drawn), down)
-    told = require(table.moved(own.shape), "sag.csv has other stops or balls")
+    told = require(table.moved(own.shape), OTHER_SAG)
     told = np.einsum("sba,pskb->pska", turn, told)
     left = np.linalg.norm(_without_motions(own - own.mean(axis=0), measured.body.T), axis=2)
     stop, ball = np.unravel_index(left.argmax(), left.shape)

@@ -23,6 +23,7 @@ Up = Literal["y", "z"]
 LEAST_OF_BYTES, ROUNDING = 2.0, 1e-3
 UNITS_MM = {"um": 0.001, "mm": 1.0, "cm": 10.0, "in": 25.4, "ft": 304.8, "m": 1000.0}
 MAX_PICTURE_BYTES = 1 << 30
+AGAIN, BESIDE = "export it again", "put it there, or do not name it"
 
 
 @dataclass(frozen=True)
@@ -56,11 +57,17 @@ class ObjectPart:
         return replace(self, points=self.points[self.faces].reshape(-1, 3), faces=faces)
 
 
+class Fault(str):
+    """A note of what cannot be converted: the file is refused where its colours are asked for."""
+
+    __slots__ = ()
+
+
 class ObjectFile(NamedTuple):
     """A file as it is read."""
 
     parts: Sequence[ObjectPart]  # its triangles
-    notes: Sequence[str] = ()  # what it names that was not found, not understood or left out
+    notes: Sequence[str] = ()  # what is left out of it; what is a `Fault` may not be
     unit: str | None = None  # key of UNITS_MM; None where the file does not say
     up: Up | None = None  # the axis that points up; None where the file does not say
 
@@ -82,6 +89,20 @@ def shown_shares(values: NDArray[Any]) -> Floats:
             "its colours are out of range: allowed is 0 to 1, 0 to 255, or 0 to 65535 as ushort"
         )
     return share.clip(0, 1)
+
+
+def in_range(
+    numbers: Sequence[Any], counts: Sequence[int], low: float, high: float
+) -> list[float] | None:
+    """Numbers of a material as real ones; None: not so many, one is none, or out of a range."""
+    good = len(numbers) in counts and all(type(one) in (int, float) for one in numbers)
+    good = good and all(low <= one <= high and np.isfinite(one) for one in numbers)
+    return [*map(float, numbers)] if good else None
+
+
+def range_text(low: float, high: float) -> str:
+    """What `in_range` allows, for the user."""
+    return f"a number from {low:g} to {high:g}" if high < np.inf else f"a number of {low:g} or more"
 
 
 def text_of(data: bytes) -> str:
@@ -191,14 +212,14 @@ def _without_case(folder: Path, file: Path) -> Path | None:
 def textured(
     mesh: Path, part: ObjectPart, uv: Floats | None, name: str, notes: list[str]
 ) -> ObjectPart:
-    """A part with the picture that its mesh names; as it is, and a note, where that is lost."""
+    """A part with the picture that its mesh names; as it is, and a fault, where that is lost."""
     if uv is None:
-        notes.append(f"it names the texture {name}, but has no texture coordinates")
+        notes.append(Fault(f"it names the texture {name}, but has no texture coordinates: {AGAIN}"))
         return part
     try:
         file = file_beside(mesh, name)
     except InputError as error:
-        notes.append(f"its texture {error}")
+        notes.append(Fault(f"its texture {error}: {BESIDE}"))
         return part
     picture = texture(file.read_bytes(), file.name, notes)
     if picture is None:
@@ -208,7 +229,7 @@ def textured(
 
 
 def texture(data: bytes, name: str, notes: list[str]) -> Bytes | None:
-    """The picture of a texture, as bytes (h, w, 3); None, and a note, where it cannot be read."""
+    """The picture of a texture, as bytes (h, w, 3); None, and a fault, where it cannot be read."""
     try:
         try:
             return shown_bytes(picture_of(data, name))
@@ -217,7 +238,7 @@ def texture(data: bytes, name: str, notes: list[str]) -> Bytes | None:
             notes.append(f"the transparency of its texture {name} is left out")
             return shown
     except InputError as error:
-        notes.append(f"its texture {error}")
+        notes.append(Fault(f"its texture {error}"))
         return None
 
 

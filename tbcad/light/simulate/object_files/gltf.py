@@ -5,17 +5,18 @@ Factors and vertex colours are light, pictures sRGB (3.9).
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tbcad.common.figure_files import srgb, srgb_light
 from tbcad.errors import InputError
 from tbcad.light.simulate.object_files.contents import (
+    AGAIN,
+    BESIDE,
+    Fault,
     ObjectFile,
     ObjectPart,
     even,
@@ -24,6 +25,7 @@ from tbcad.light.simulate.object_files.contents import (
     without_facets,
 )
 from tbcad.light.simulate.object_files.finish import Finish, dielectric_f0
+from tbcad.light.simulate.object_files.gltf_file import CUT_OFF, GltfFile, Json, finite
 from tbcad.types import Bytes, Floats, Ints
 
 MAGIC = b"glTF"
@@ -31,8 +33,6 @@ JSON_START = 20  # behind the header of the file and that of its first chunk
 DRACO, GLOSSY = "KHR_draco_mesh_compression", "KHR_materials_pbrSpecularGlossiness"
 UNLIT, IOR, SPECULAR = (f"KHR_materials_{name}" for name in ("unlit", "ior", "specular"))
 TRANSFORM, WEBP = "KHR_texture_transform", "EXT_texture_webp"
-TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 TRIANGLES, FAN = 4, 6
 OTHER_MODES = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 LEFT_OUT = {
@@ -42,68 +42,15 @@ LEFT_OUT = {
 }
 CLAMP, MIRRORED = 33071, 33648
 FULL_UV = 1e-6
-CUT_OFF = "one of its buffers is cut off: copy it again"
 MOST_NODES = 100_000
 READ = {DRACO, TRANSFORM, WEBP, "KHR_mesh_quantization"}
 ONLY_LOOKS = "KHR_materials_"  # gloss, glass, cloth ...: of the surface, not of its colour
+PNG = "textures as PNG"
 REMEDY = {
     "EXT_meshopt_compression": "gltfpack without -c, or gltf-transform copy",
-    "KHR_texture_basisu": "gltf-transform with textures as PNG",
+    "KHR_texture_basisu": f"gltf-transform with {PNG}",
 }
 AS_MODELLED = "are left out: it stands as it was modelled"
-Json = dict[str, Any]
-Values = NDArray[Any]
-
-
-@dataclass
-class GltfFile:
-    """A document with its buffers, the pictures that were asked for, and what is left out of it."""
-
-    path: Path
-    document: Json
-    buffers: list[bytes]
-    notes: list[str] = field(default_factory=list)
-    pictures: dict[Any, Bytes | None] = field(default_factory=dict)
-
-    def view(self, number: int) -> bytes:
-        """The bytes of a buffer view."""
-        view = self.document["bufferViews"][number]
-        start = view.get("byteOffset", 0)
-        data: bytes = self.buffers[view["buffer"]][start : start + view["byteLength"]]
-        if len(data) < view["byteLength"]:
-            raise InputError(CUT_OFF)
-        return data
-
-    def numbers(self, number: int) -> Values:
-        """A table (n, width) as it is stored."""
-        accessor = self.document["accessors"][number]
-        count, width = int(accessor["count"]), WIDTHS[accessor["type"]]
-        kind = np.dtype(TYPES[accessor["componentType"]])
-        found = np.zeros((count, width), dtype=kind)
-        if "bufferView" in accessor:
-            found = self._table(accessor, kind, count, width)
-        if "sparse" in accessor:
-            sparse, found = accessor["sparse"], found.copy()
-            where = np.dtype(TYPES[sparse["indices"]["componentType"]])
-            rows = self._table(sparse["indices"], where, sparse["count"], 1)[:, 0]
-            found[rows] = self._table(sparse["values"], kind, sparse["count"], width)
-        return found
-
-    def real(self, number: int) -> Floats:
-        """A table (n, width); whole numbers that are normalized become 0 to 1, or -1 to 1."""
-        found = self.numbers(number)
-        if self.document["accessors"][number].get("normalized") and found.dtype.kind in "iu":
-            return np.maximum(found / np.iinfo(found.dtype).max, -1.0)
-        return found.astype(np.float64)
-
-    def _table(self, at: Json, kind: np.dtype[Any], count: int, width: int) -> Values:
-        step = self.document["bufferViews"][at["bufferView"]].get("byteStride", 0)
-        steps = step or width * kind.itemsize, kind.itemsize
-        data, offset = self.view(at["bufferView"]), at.get("byteOffset", 0)
-        try:
-            return np.ndarray((count, width), kind, data, offset, steps)
-        except (TypeError, ValueError):
-            raise InputError(CUT_OFF) from None
 
 
 def read_gltf(path: Path) -> ObjectFile:
@@ -248,10 +195,12 @@ def _coloured(
     file: GltfFile, part: ObjectPart, number: int | None, attributes: dict[str, Floats]
 ) -> ObjectPart:
     """A part with the colours of a material and of its corners, multiplied."""
-    material = {} if number is None else file.document["materials"][number]
-    factor, reference = _base(material)
+    material = file.material(number)
+    factor, reference = _base(file, material)
     _note_left_out(file, material, factor)
     corner = attributes.get("COLOR_0")
+    if corner is not None and not np.isfinite(corner).all():
+        raise InputError("its vertex colours are not finite: repair the mesh")
     if corner is not None and corner.shape[1] > 3 and (corner[:, 3] < 1).any():
         file.notes.append("its transparency is left out")
     picture = None if reference is None else _picture(file, reference, factor[:3])
@@ -271,19 +220,18 @@ def _coloured(
     return replace(part, colours=shares, source=source)
 
 
-def _base(material: Json) -> tuple[Floats, Json | None]:
+def _base(file: GltfFile, material: Json) -> tuple[Floats, Json | None]:
     """Factor (4,), light, and the reference to a texture."""
-    base = material.get("pbrMetallicRoughness", {})
-    factor, found = base.get("baseColorFactor"), base.get("baseColorTexture")
+    base, name = material.get("pbrMetallicRoughness", {}), "baseColor"
     glossy = material.get("extensions", {}).get(GLOSSY)
     if glossy is not None and "pbrMetallicRoughness" not in material:
-        factor, found = glossy.get("diffuseFactor"), glossy.get("diffuseTexture")
-    return np.array(factor or (1, 1, 1, 1), dtype=np.float64), found
+        base, name = glossy, "diffuse"
+    return file.factor(base, f"{name}Factor", (1, 1, 1, 1)), base.get(f"{name}Texture")
 
 
 def _note_left_out(file: GltfFile, material: Json, factor: Floats) -> None:
     file.notes += [note for key, note in LEFT_OUT.items() if key in material]
-    if any(value > 0 for value in material.get("emissiveFactor", ())):
+    if (file.factor(material, "emissiveFactor", (0, 0, 0)) > 0).any():
         file.notes.append(LEFT_OUT["emissiveTexture"])
     mode = material.get("alphaMode", "OPAQUE")
     if mode == "MASK" or (mode != "OPAQUE" and factor[3] < 1):
@@ -294,20 +242,22 @@ def _finish(
     file: GltfFile, number: int | None, attributes: dict[str, Floats], part: ObjectPart
 ) -> Finish | None:
     """How a part shines; what its material does not say is rough metal (3.9.2)."""
-    material = {} if number is None else file.document["materials"][number]
+    material = file.material(number)
     more, facets = material.get("extensions", {}), len(part.faces)
     if number is None or UNLIT in more:
         return None
     base, old = material.get("pbrMetallicRoughness", {}), more.get(GLOSSY)
     if old is not None and not base:
-        roughness = 1 - float(old.get("glossinessFactor", 1))
-        return Finish.even(facets, roughness, 0.0, old.get("specularFactor", (1, 1, 1)))
-    f0 = dielectric_f0(float(more.get(IOR, {}).get("ior", 1.5)))
-    told = more.get(SPECULAR, {})
-    tint = np.array(told.get("specularColorFactor", (1, 1, 1)), dtype=np.float64)
-    shares = np.minimum(f0 * tint, 1) * float(told.get("specularFactor", 1))
+        roughness = 1 - file.factor(old, "glossinessFactor", 1)
+        return Finish.even(facets, roughness, 0.0, file.factor(old, "specularFactor", (1, 1, 1)))
+    index, told = file.factor(more.get(IOR, {}), "ior", 1.5, np.inf), more.get(SPECULAR, {})
+    if 0 < index < 1:  # 0: reflects as metals do
+        file.notes.append(Fault(f"ior is {index:g}, allowed is 0, or 1 and more: {AGAIN}"))
+    tint = file.factor(told, "specularColorFactor", (1, 1, 1), np.inf)
+    shares = np.minimum(dielectric_f0(float(index)) * tint, 1)
+    shares = shares * file.factor(told, "specularFactor", 1)
     map_of = _roughness_and_metal(file, base.get("metallicRoughnessTexture"), attributes, part)
-    rough, metal = (float(base.get(f"{name}Factor", 1)) for name in ("roughness", "metallic"))
+    rough, metal = (file.factor(base, f"{name}Factor", 1) for name in ("roughness", "metallic"))
     return Finish.even(facets, rough * map_of[:, 0], metal * map_of[:, 1], shares)
 
 
@@ -350,13 +300,14 @@ def _source(file: GltfFile, reference: Json) -> tuple[Json | None, str]:
 def _image(file: GltfFile, reference: Json) -> Bytes | None:
     image, name = _source(file, reference)
     if image is None:
-        file.notes.append("one of its textures is of a kind that is not read")
+        kind = f"a texture of it is of a kind that is not read: write it with {PNG}"
+        file.notes.append(Fault(kind))
         return None
     try:
         inside = "bufferView" in image
         data = file.view(image["bufferView"]) if inside else uri_bytes(file.path, image["uri"])
     except InputError as error:
-        file.notes.append(f"its texture {error}")
+        file.notes.append(Fault(f"its texture {error}: {BESIDE}"))
         return None
     return texture(data, name, file.notes)
 
@@ -369,13 +320,13 @@ def _coordinates(
     number = transform.get("texCoord", reference.get("texCoord", 0))
     given = attributes.get(f"TEXCOORD_{number}")
     if given is None:
-        file.notes.append("it names a texture, but has no texture coordinates")
+        file.notes.append(Fault(f"it names a texture, but has no texture coordinates: {AGAIN}"))
         return None
-    turn = float(transform.get("rotation", 0.0))
+    turn = finite(transform, "rotation", 0.0)
     cosine, sine = np.cos(turn), np.sin(turn)
-    scaled = given * np.array(transform.get("scale", (1, 1)), dtype=np.float64)
+    scaled = given * finite(transform, "scale", (1, 1))
     uv = scaled @ np.array([[cosine, -sine], [sine, cosine]])
-    uv += np.array(transform.get("offset", (0, 0)), dtype=np.float64)
+    uv += finite(transform, "offset", (0, 0))
     sampler = file.document["textures"][reference["index"]].get("sampler")
     if sampler is not None and not ((uv >= -FULL_UV) & (uv <= 1 + FULL_UV)).all():
         modes = file.document["samplers"][sampler]

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.object_files.contents import ObjectFile, ObjectPart, without_facets
+from tbcad.light.simulate.object_files.contents import (
+    AGAIN,
+    Fault,
+    ObjectFile,
+    ObjectPart,
+    without_facets,
+)
 from tbcad.light.simulate.object_files.gltf import read_gltf
 from tbcad.light.simulate.object_files.ply import read_off, read_ply
 from tbcad.light.simulate.object_files.wavefront import read_obj
@@ -191,7 +197,9 @@ def _3mf_colour(
     else:
         notes.append("its textures and mixed materials are left out")
         return None
-    if colour.Alpha < 255:
+    if not any((colour.Red, colour.Green, colour.Blue, colour.Alpha)):  # lib3mf's of a bad one
+        notes.append(Fault(f"one of its colours is not #RRGGBB, or has no opacity at all: {AGAIN}"))
+    elif colour.Alpha < 255:
         notes.append("its transparency is left out")
     return colour.Red / 255, colour.Green / 255, colour.Blue / 255
 

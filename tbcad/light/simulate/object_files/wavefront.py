@@ -1,5 +1,6 @@
 """OBJ files with their MTL files (Wavefront, Advanced Visualizer, appendix B, 1995)."""
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -10,24 +11,41 @@ import numpy as np
 
 from tbcad.errors import InputError
 from tbcad.light.simulate.object_files.contents import (
+    AGAIN,
+    BESIDE,
     ROUNDING,
+    Fault,
     ObjectFile,
     ObjectPart,
     even,
     file_beside,
+    in_range,
+    range_text,
     shown_shares,
     text_of,
     textured,
     triangles,
     without_facets,
 )
-from tbcad.light.simulate.object_files.finish import Finish, phong_finish
+from tbcad.light.simulate.object_files.finish import F0, Finish, dielectric_f0, phong_finish
 from tbcad.types import Floats, Ints
 
 OPTIONS = re.compile(r"((?:-[a-z]+(?:\s+(?:on|off|[-+.\de]+|[rgbmlz]))+\s+)*)(.*)", re.IGNORECASE)
-IGNORED = {"bump", "norm", "disp", "refl", "map_bump", "map_ks", "map_ke", "map_d", "map_ns",
-           "map_pr", "map_pm", "map_ka", "decal"}  # fmt: skip
-OPAQUE = {"d": 1.0, "tr": 0.0}
+# Of MTL's keys with numbers: how many, least and largest. Kd to Ni are of the specification above,
+# Pr and what follows of its extension for physically based rendering (D. Neubelt and others, 2015).
+NUMBERS: dict[str, tuple[tuple[int, ...], float, float]] = {
+    **dict.fromkeys(("kd", "ks"), ((1, 3), 0.0, 1 + ROUNDING)),
+    "ke": ((1, 3), 0.0, np.inf), "ns": ((1,), 0.0, np.inf), "ni": ((1,), 0.0, 10.0),
+    **dict.fromkeys(("d", "tr", "pr", "pm", "ps", "pc"), ((1,), 0.0, 1.0)),
+    "illum": ((1,), 0.0, 10.0), "aniso": ((1,), -1.0, 1.0),
+}  # fmt: skip
+# What is not converted, and the value with which it changes nothing.
+NOT_CONVERTED = {
+    "d": ("transparency", 1.0), "tr": ("transparency", 0.0), "ke": ("light (Ke)", 0.0),
+    "ps": ("sheen (Ps)", 0.0), "pc": ("clear coat (Pc)", 0.0), "aniso": ("anisotropy", 0.0),
+}  # fmt: skip
+# Of no weight without those, or for rays that go to the camera at once.
+HARMLESS = {"ka", "tf", "sharpness", "pcr", "anisor"}
 TABLES = ("v", "vt", "vn")
 LEFT_OUT = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
 
@@ -39,13 +57,15 @@ class _Material:
     colour: list[float] | None = None
     picture: str | None = None
     specular: list[float] | None = None
-    numbers: dict[str, float] = field(default_factory=dict)  # ns, pr, pm and illum
+    numbers: dict[str, float] = field(default_factory=dict)  # ns, ni, pr, pm and illum
 
     def finish(self, facets: int) -> Finish | None:
         """How facets shine: by Pr and Pm, else by Ns and Ks; None: matt, as illum 0 and 1 say."""
         told = self.numbers
         if told.keys() & {"pr", "pm"}:
-            return Finish.even(facets, told.get("pr", 1.0), told.get("pm", 0.0))
+            # many programs write an index of 1 or 0, which nothing solid has, where they know none
+            f0 = dielectric_f0(told["ni"]) if told.get("ni", 1.0) > 1 else F0
+            return Finish.even(facets, told.get("pr", 1.0), told.get("pm", 0.0), f0)
         shines = self.specular is not None and max(self.specular) > 0 and "ns" in told
         if not shines or self.specular is None or told.get("illum", 2) < 2:
             return None
@@ -94,7 +114,7 @@ def read_obj(path: Path) -> ObjectFile:
     parts = []
     for k, name in enumerate(names.tolist()):
         if name and materials is not None and name not in materials:
-            notes.append(f"its material {name} is in no MTL file")
+            notes.append(Fault(f"its material {name} is in no MTL file: {AGAIN}"))
         own = index[cut[which[polygon] == k]]
         part = _part(vertices[:, :3], normals, own)
         if colours is not None:
@@ -171,50 +191,53 @@ def _files(path: Path, names: str, notes: list[str]) -> Iterator[Path]:
             try:
                 yield file_beside(path, name)
             except InputError as error:
-                notes.append(f"its materials {error}")
+                notes.append(Fault(f"its materials {error}: {BESIDE}"))
 
 
 def _read_materials(file: Path, found: dict[str, _Material], notes: list[str]) -> None:
     material = _Material()
-    for line in text_of(file.read_bytes()).splitlines():
-        key, _, rest = line.strip().replace("\t", " ").partition(" ")
-        key, rest = key.lower(), rest.strip()
-        match key:
-            case "newmtl":
-                material = found.setdefault(rest, _Material())
-            case "kd":
-                material.colour = _colour("Kd", rest, notes)
-            case "ks":
-                material.specular = _colour("Ks", rest, notes)
-            case "ns" | "pr" | "pm" | "illum":
-                material.numbers |= dict(zip([key], _numbers(rest), strict=False))
-            case "map_kd" if rest and (match := OPTIONS.fullmatch(rest)):
-                material.picture = match[2].strip()
-                if match[1]:
-                    notes.append(f"options of a texture are left out: {match[1].strip()}")
-            case "d" | "tr":
-                if _numbers(rest)[:1] not in ([], [OPAQUE[key]]):
-                    notes.append("its transparency is left out")
-            case "ke":
-                if any(number > 0 for number in _numbers(rest)):
-                    notes.append("light of its materials (Ke) is left out")
-            case _ if key in IGNORED:
-                notes.append(f"its {line.split()[0]} is left out")
+    for number, line in enumerate(text_of(file.read_bytes()).splitlines(), 1):
+        word, _, rest = line.strip().replace("\t", " ").partition(" ")
+        key, rest = word.lower(), rest.strip()
+        if key in NUMBERS:
+            _take_numbers(material, key, rest, notes, f"{file.name}, line {number}: {word}")
+        elif key == "newmtl":
+            material = found.setdefault(rest, _Material())
+        elif key == "map_kd" and rest and (match := OPTIONS.fullmatch(rest)):
+            material.picture = match[2].strip()
+            if match[1]:
+                notes.append(f"options of a texture are left out: {match[1].strip()}")
+        elif key and key not in HARMLESS and not key.startswith("#"):
+            notes.append(f"its {word:.40} is left out")
 
 
-def _numbers(text: str) -> list[float]:
-    """Numbers before a comment; none where one is none."""
-    try:
-        return [float(number) for number in text.partition("#")[0].split()]
-    except ValueError:
-        return []
+def _take_numbers(material: _Material, key: str, text: str, notes: list[str], where: str) -> None:
+    """Numbers of a line before its comment into a material; a fault where they cannot be."""
+    counts, low, high = NUMBERS[key]
+    words = text.partition("#")[0].split()
+    numbers = in_range([_real(word) for word in words if word != "-halo"], counts, low, high)
+    if numbers is None:
+        three = " or three" if 3 in counts else ""
+        allowed = range_text(low, round(high, 2)) + three
+        notes.append(Fault(f"{where} is {text:.40}, allowed is {allowed}: mend it"))
+    elif key == "kd":
+        material.colour = _three(numbers)
+    elif key == "ks":
+        material.specular = _three(numbers)
+    elif key not in NOT_CONVERTED:
+        material.numbers[key] = numbers[0]
+    elif any(number != NOT_CONVERTED[key][1] for number in numbers):
+        notes.append(f"its {NOT_CONVERTED[key][0]} is left out")
 
 
-def _colour(name: str, text: str, notes: list[str]) -> list[float] | None:
+def _three(numbers: list[float]) -> list[float]:
     """Red, green and blue; one number is grey."""
-    numbers = _numbers(text)
-    numbers = numbers * 3 if len(numbers) == 1 else numbers
-    if len(numbers) != 3 or not all(0 <= number <= 1 + ROUNDING for number in numbers):
-        notes.append(f"its colour {name} {text:.40} is not understood: allowed are three of 0 to 1")
-        return None
-    return [min(number, 1.0) for number in numbers]
+    return [min(number, 1.0) for number in numbers * (3 // len(numbers))]
+
+
+def _real(word: str) -> float:
+    """NaN where a word is no number."""
+    try:
+        return float(word)
+    except ValueError:
+        return math.nan

@@ -278,7 +278,8 @@ def prototype_run(
         window = rotated(plan.apex[ball], plan.frame[0], plan.angle[stop]) * flip
     # The direction to one apex becomes that to the other, and the plane of incidence of the light
     # from the origin stays one (tbcad.core.optics.windows).
-    before, after = _sight(window, reflector.camera.pinhole), _sight(apex, camera.pinhole)
+    before = sight_frames(unit(window - reflector.camera.pinhole), reflector.camera.pinhole)
+    after = sight_frames(unit(apex - camera.pinhole), camera.pinhole)
     return PrototypeRun(
         reflector=reflector,
         camera=camera,
@@ -329,9 +330,12 @@ def ball_reflector(run: PrototypeRun) -> SubstitutedReflector:
     return SubstitutedReflector(shell.camera_id, shell.camera, unit(balls.apex), shell.cells, balls)
 
 
-def _sight(apex: Floats, pinhole: Floats) -> Floats:
-    """Rows: direction to each apex, across the plane of incidence, and in it, (m, 3, 3)."""
-    ahead, home = unit(apex - pinhole), unit(-pinhole)
+def sight_frames(ahead: Floats, pinhole: Floats) -> Floats:
+    """Rows: unit directions (m, 3), across the plane of incidence, and in it, (m, 3, 3).
+
+    That of the light from the origin: windows are turned from one such frame into another.
+    """
+    home = unit(-pinhole)
     along = dot(ahead, np.broadcast_to(home, ahead.shape))
     inward = unit(home - along[:, None] * ahead)
     return np.stack([ahead, np.cross(inward, ahead), inward], axis=1)

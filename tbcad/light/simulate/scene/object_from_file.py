@@ -14,6 +14,7 @@ from tbcad.core.geometry.vectors import facet_vectors, norm
 from tbcad.errors import InputError, PlausibilityWarning
 from tbcad.light.simulate.object_files.contents import (
     UNITS_MM,
+    Fault,
     ObjectFile,
     ObjectPart,
     Up,
@@ -72,11 +73,13 @@ def load_object(
     axis and colours were taken.
 
     Raises:
-        InputError: it cannot be read, is empty, has no facets or is too large; it names the size.
+        InputError: it cannot be read, is empty, has no facets or is too large; it names the size;
+            or its colours are asked for, and a number of its materials cannot be or a texture is
+            missing.
 
     Warns:
-        PlausibilityWarning: it is so small that its unit is likely to be another one, or it names
-            what was not found or is left out.
+        PlausibilityWarning: it is so small that its unit is likely to be another one, or it has
+            what is left out.
     """
     if file is None:
         return built_in_object(capture_mm)
@@ -208,6 +211,8 @@ def _painted(
         patterned = paint == "pattern"
         text = PATTERN if patterned else PLAIN
         return {"albedo": plain, "patterned": patterned, "text": text}, []
+    if faults := [note for note in found.notes if isinstance(note, Fault)]:
+        raise InputError(f"{path}: {faults[0]}")
     sources = list(dict.fromkeys(part.source for part in found.parts if part.source))
     notes = list(found.notes)
     if not sources:

@@ -1,6 +1,7 @@
 """Roughness, metal and reflectance of materials, as glTF and MTL define them."""
 
 import json
+import re
 from base64 import b64encode
 from io import BytesIO
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tbcad.errors import InputError
 from tbcad.light.simulate.object_files.finish import Finish, phong_finish
 from tbcad.light.simulate.object_files.read import read_object_file
 from tbcad.light.simulate.scene.object_from_file import ObjectOptions, load_object
@@ -144,3 +146,80 @@ def test_what_is_told(tmp_path: Path) -> None:
     assert lines[0].endswith("gloss in real optics: roughness 0.2, 50% metal, 50% matt")
     assert load_object(path, 60.0, ObjectOptions(fit=True, paint="plain")).finish is None
     assert phong_finish(1, 1e9, [1, 1, 1]).roughness == pytest.approx([0.05])
+
+
+@pytest.mark.parametrize(
+    ("f0", "lines"), [(1 / 9, "Ni 2"), (0.04, "Ni 1.0"), (0.04, "Ni 0"), (0.04, "")]
+)
+def test_mtl_by_index(tmp_path: Path, f0: float, lines: str) -> None:
+    (finish,) = finish_of(obj(tmp_path, f"Pr 0.4 # rough\nd -halo 1\n{lines}"))
+    assert finish is not None
+    assert finish.f0 == pytest.approx(np.full((1, 3), f0))
+
+
+@pytest.mark.parametrize(
+    ("line", "allowed"),
+    [
+        *((f"{key} {text}", "0 to 1") for key in ("Pr", "Pm", "d") for text in ("nan", "-0.1", "")),
+        *((f"{key} {text}", "0 to 1 or three") for key in ("Kd", "Ks")
+          for text in ("1 x 1", "2", "1 1", "0.5 inf 0", "spectral a.rfl")),
+        *((f"Ns {text}", "of 0 or more") for text in ("many", "-1", "inf", "1 2", "1e999")),
+        ("Ni -1.5", "0 to 10"),
+        ("illum two", "0 to 10"),
+        ("Ke 1 1", "of 0 or more or three"),
+        ("Tr 1.5", "0 to 1"),
+    ],
+)  # fmt: skip
+def test_numbers_of_mtl_that_cannot_be(tmp_path: Path, line: str, allowed: str) -> None:
+    """Refused by their place, unless its colours are not asked for."""
+    path, (word, _, text) = obj(tmp_path, line), line.partition(" ")
+    refused = rf"m.mtl, line 3: {word} is {re.escape(text)}, allowed is a number .*{allowed}: mend"
+    with pytest.raises(InputError, match=refused) as error:
+        load_object(path, 60.0, ObjectOptions(fit=True))
+    assert "\n" not in str(error.value)
+    assert load_object(path, 60.0, ObjectOptions(fit=True, paint="plain")).finish is None
+
+
+def extended(name: str, **values: Any) -> dict[str, Any]:
+    return pbr() | {"extensions": {f"KHR_materials_{name}": values}}
+
+
+@pytest.mark.parametrize(
+    ("material", "said"),
+    [
+        (pbr(roughnessFactor=-0.3), "roughnessFactor is -0.3, allowed is a number from 0 to 1"),
+        (pbr(roughnessFactor="0.5"), "roughnessFactor is 0.5"),
+        (pbr(roughnessFactor=True), "roughnessFactor is True"),
+        (pbr(metallicFactor=float("nan")), "metallicFactor is nan"),
+        (pbr(metallicFactor=float("inf")), "metallicFactor is inf"),
+        (pbr(baseColorFactor=[1, 1, 1.5, 1]), "baseColorFactor .* from 0 to 1, 4 times"),
+        (pbr(baseColorFactor=[1, 1, 1]), "baseColorFactor"),
+        (pbr(baseColorFactor=None), "baseColorFactor is None"),
+        ({"emissiveFactor": [0, 0, -1]}, "emissiveFactor"),
+        (extended("ior", ior=-1), "ior is -1"),
+        (extended("ior", ior=0.5), "ior is 0.5, allowed is 0, or 1 and more"),
+        (extended("specular", specularFactor=2), "specularFactor is 2"),
+        (extended("specular", specularColorFactor=[1, float("nan"), 1]), "specularColorFactor"),
+        (
+            {"extensions": {"KHR_materials_pbrSpecularGlossiness": {"glossinessFactor": 1.2}}},
+            "glossinessFactor is 1.2",
+        ),
+        (pbr(metallicRoughnessTexture={"index": 0}), "lost.png is not in .*: put it there"),
+        (pbr(baseColorTexture={"index": 0}), "lost.png is not in the folder"),
+    ],
+)
+def test_factors_of_gltf_that_cannot_be(
+    tmp_path: Path, material: dict[str, Any], said: str
+) -> None:
+    lost = {"images": [{"uri": "lost.png"}], "textures": [{"source": 0}]}
+    with pytest.raises(InputError, match=said) as error:
+        load_object(gltf(tmp_path, material, **lost), 60.0, ObjectOptions(fit=True))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("number", [-1, 1])
+def test_materials_of_gltf_that_are_not_there(tmp_path: Path, number: int) -> None:
+    path = gltf(tmp_path, pbr())
+    path.write_text(path.read_text().replace('"material": 0', f'"material": {number}'))
+    with pytest.raises(InputError, match=f"names material {number}, which it does not have"):
+        read_object_file(path)

@@ -18,6 +18,7 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.object_files.contents import ObjectFile
 from tbcad.light.simulate.object_files.gltf import read_gltf
 from tbcad.light.simulate.object_files.read import read_3mf
+from tbcad.light.simulate.scene.object_from_file import load_object
 
 # sRGB's code of light 0.5 and 0.2, by the standard's table.
 HALF, FIFTH = 0.735357, 0.484529
@@ -262,3 +263,14 @@ def test_nothing_built(tmp_path: Path) -> None:
     path = written(tmp_path / "a.3mf", f'<object id="2">{mesh()}</object>', "")
     with pytest.raises(InputError, match="builds no mesh"):
         read_3mf(path)
+
+
+@pytest.mark.parametrize("colour", ["red", "#FF00"])
+def test_colours_that_cannot_be(tmp_path: Path, colour: str) -> None:
+    resources = (
+        f'<basematerials id="1"><base name="r" displaycolor="{colour}"/></basematerials>'
+        f'<object id="2" pid="1" pindex="0">{mesh()}</object>'
+    )
+    path = written(tmp_path / "a.3mf", resources, '<item objectid="2"/>')
+    with pytest.raises(InputError, match="is not #RRGGBB"):
+        load_object(path, 150.0)

@@ -9,7 +9,7 @@ import trimesh
 from PIL import Image
 
 from tbcad.errors import InputError
-from tbcad.light.simulate.object_files.contents import ObjectFile, ObjectPart
+from tbcad.light.simulate.object_files.contents import Fault, ObjectFile, ObjectPart
 from tbcad.light.simulate.object_files.read import read_object_file
 
 CORNERS = ("-1 -1 0", "1 -1 0", "1 1 0", "-1 1 0")
@@ -152,7 +152,9 @@ def test_links_do_not_lead_out(tmp_path: Path, write: Write) -> None:
     (inside / "a.obj").write_text(obj("mtllib a.mtl", "usemtl m", "f 1 2 3"))
     found = read_object_file(inside / "a.obj")
     assert only(found).colours is None
-    assert found.notes == ["its materials a.mtl is not in the folder of the mesh"]
+    lost = "its materials a.mtl is not in the folder of the mesh: put it there, or do not name it"
+    assert found.notes == [lost]
+    assert isinstance(found.notes[0], Fault)
 
 
 def test_materials_of_several_files(write: Write) -> None:

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tbcad_verify.mesh.rays import RAYS_A_CHUNK, in_threads
 from tbcad_verify.mesh.surfaces import (
-    ReflectedRays,
     Surfaces,
     nearest_on_rays,
     prepare_for_rays,
@@ -26,7 +23,6 @@ from tbcad_verify.mesh.vectors import (
     distances_to_segments,
     dot,
     norm,
-    polar_and_azimuth,
     rotation_angles,
     unit,
 )
@@ -43,6 +39,7 @@ from tbcad_verify.prototype.light.pinhole_cells import (
     mirror_spheres,
     sampled_pixels,
 )
+from tbcad_verify.prototype.light.windows import RayTransfer, Reflecting, ray_transfer, rotated
 from tbcad_verify.prototype.measured_parts import PLACED
 from tbcad_verify.report.checks import (
     Check,
@@ -187,12 +184,10 @@ def _largest_share(
 
 
 def _coverage(transfer: RayTransfer, outlines: PinholeOutlines, nearest: Floats) -> Floats:
-    """(m,) coverage of all mirrors in the frame of the base, mm."""
-    context = transfer.measured.context
-    apex = context.prototype.balls.columns("px", 3)[:, transfer.ball]
-    middle = unit(apex - context.pinhole[:, None])
-    d = np.einsum("ijm,jms->ims", transfer.on_base, outlines.direction)
-    return outline_coverage(outlines.is_edge, nearest, d, middle, context.halved)
+    """(m,) coverage of all mirrors, mm."""
+    d = np.einsum("ijm,jms->ims", transfer.merged, outlines.direction)
+    halved = transfer.measured.context.halved
+    return outline_coverage(outlines.is_edge, nearest, d, transfer.middle, halved)
 
 
 def outline_coverage(
@@ -274,13 +269,9 @@ def pixel_rays(measured: MeasuredPrototype) -> PixelRays:
 
 def ray_paths(measured: MeasuredPrototype, pixel: PixelRays) -> RayPaths:
     """Paths of the pixels' rays, each at its stop."""
-    transfer = ray_transfer(measured)
-    to_ball, rays = transfer.reflected(pixel.mirror, pixel.direction)
-    base = transfer.base[pixel.mirror]
-    point, after = (base.apply(np.array(x.T)) for x in (rays.point, unit(rays.toward)))
-    nearest = base.apply(np.array(nearest_on_rays(rays).T))
-    before = base.apply(np.array(unit(to_ball).T))
-    return RayPaths(point, before, after, np.linalg.norm(nearest - point, axis=1))
+    to_ball, rays = ray_transfer(measured).reflected(pixel.mirror, pixel.direction)
+    away = norm(nearest_on_rays(rays) - rays.point)
+    return RayPaths(rays.point.T, unit(to_ball).T, unit(rays.toward).T, away)
 
 
 def stopped_above(measured: MeasuredPrototype, pixel: PixelRays) -> Bools:
@@ -293,69 +284,6 @@ def stopped_above(measured: MeasuredPrototype, pixel: PixelRays) -> Bools:
     to_ball = np.linalg.norm(paths.point - origin, axis=1)
     stopped = above.first(origin.T, paths.before.T)[1] < to_ball
     return np.asarray(stopped | (above.first(paths.point.T, paths.after.T)[1] < paths.reach))
-
-
-class Reflecting(Protocol):
-    """Map from directions of the shell's picture to rays after the balls."""
-
-    def reflected(self, mirror: Ints, d: Floats) -> tuple[Floats, ReflectedRays]:
-        """Directions (3, N) of mirrors' cells as they meet the balls, and their reflections."""
-
-
-@dataclass(frozen=True)
-class RayTransfer:
-    """Map from directions of the shell's picture to rays on the balls, for m mirrors."""
-
-    measured: MeasuredPrototype  # balls and obstacles
-    # (3, 3, m) rotates directions of a mirror's cell in the shell's picture to where the merged
-    # picture has them on the mirror's ball
-    merged: Floats
-    on_base: Floats  # (3, 3, m) the same, to the frame of the base at the mirror's stop
-    ball: Ints  # (m,) that substitutes for the mirror
-    base: Rotation  # m rotations of the base
-
-    def reflected(self, mirror: Ints, d: Floats) -> tuple[Floats, ReflectedRays]:
-        """Directions (3, N) of mirrors' cells in the base's frame, and their reflections."""
-        on_base = rotated(self.on_base[:, :, mirror], d)
-        return on_base, reflect(self.measured.mirrors, self.ball[mirror], on_base)
-
-
-def ray_transfer(measured: MeasuredPrototype) -> RayTransfer:
-    """The transfer for all mirrors of the camera."""
-    context = measured.context
-    ball, base = context.ball, context.base_rotation(context.angle)
-    merged = Rotation.identity(ball.size)
-    if context.moved:
-        apex = base.apply(context.prototype.balls.columns("px", 3)[:, ball].T).T
-        merged = _picture_rotation(context, apex)
-    return RayTransfer(measured, _matrices(merged), _matrices(base.inv() * merged), ball, base)
-
-
-def _picture_rotation(context: PrototypeContext, ball_apex: Floats) -> Rotation:
-    """Rotations of the pictures that are moved along with their balls, of apices (3, m), mm.
-
-    About the axis, by the known difference of the azimuths of ball and mirror; and in the plane of
-    the axis, by the known angle between both apices as the pinhole sees them.
-    """
-    _, zero, third = frame = context.frame
-    mirror_apex = context.export.mirrors.columns("px", 3)[:, context.mirror_rows]
-    apices, pinhole = (mirror_apex, ball_apex), context.pinhole[:, None]
-    (_, phi), (_, psi) = (polar_and_azimuth(frame, x) for x in apices)
-    (low, _), (high, _) = (polar_and_azimuth(frame, x - pinhole) for x in apices)
-    # At right angles to the plane of axis and ball: rotates the axis toward the ball's azimuth.
-    across = -np.sin(psi)[:, None] * zero + np.cos(psi)[:, None] * third
-    tilt = Rotation.from_rotvec((high - low)[:, None] * across)
-    return tilt * context.base_rotation(psi - phi)
-
-
-def _matrices(rotations: Rotation) -> Floats:
-    """(3, 3, m) matrices of m rotations."""
-    return np.ascontiguousarray(np.moveaxis(rotations.as_matrix(), 0, 2))
-
-
-def rotated(matrix: Floats, d: Floats) -> Floats:
-    """(3, N) columns d under matrices (3, 3, N)."""
-    return np.asarray(np.einsum("ijn,jn->in", matrix, d))
 
 
 def nearest_points(transfer: Reflecting, mirror: Ints, d: Floats) -> Floats:
@@ -389,12 +317,11 @@ def blocked_rays(transfer: RayTransfer, mirror: Ints, d: Floats) -> tuple[Bools,
 
 def _hits(transfer: RayTransfer, mirror: Ints, d: Floats) -> Hits:
     """All that can stop rays, one after the other, on the way to the ball and from it."""
-    measured = transfer.measured
-    radius, base = measured.context.radius, transfer.base[mirror]
-    ball = transfer.ball[mirror]
+    measured, ball = transfer.measured, transfer.ball[mirror]
+    radius, held = measured.context.radius, transfer.held.take(mirror)
     to_ball, rays = transfer.reflected(mirror, d)
     pinhole = np.broadcast_to(measured.context.pinhole[:, None], to_ball.shape)
-    off_centre = norm(rays.point - measured.body[:, ball])
+    off_centre = norm(held.on_base(rays.point) - measured.seated[:, ball])
     yield ~(off_centre <= measured.body_radius[ball] + LIFT_MM), "nothing (beside the ball)"
     from_object = distances_to_segments(np.zeros_like(to_ball), pinhole, rays.point)
     yield from_object < radius, "the capture sphere"
@@ -406,12 +333,12 @@ def _hits(transfer: RayTransfer, mirror: Ints, d: Floats) -> Hits:
         (start, from_ball, norm(nearest - start) - depth),
     )
     for origin, along, length in legs:
+        start_on, along_on = held.on_base(origin), held.vectors_on_base(along)
         for k in range(measured.body_radius.size):
-            hit = _meets(measured.body[:, k], measured.body_radius[k], origin, along, length)
-            yield hit & (ball != k), f"ball {k + 1}"
-        yield from _part_hits(measured.rotating, origin, along, length)
-        on_ground = [base.apply(np.array(x.T)).T for x in (origin, along)]
-        yield from _part_hits(measured.fixed, on_ground[0], on_ground[1], length)
+            sphere = measured.seated[:, k], measured.body_radius[k]
+            yield _meets(*sphere, start_on, along_on, length) & (ball != k), f"ball {k + 1}"
+        yield from _part_hits(measured.rotating, start_on, along_on, length)
+        yield from _part_hits(measured.fixed, origin, along, length)
 
 
 def _meets(centre: Floats, radius: float, origin: Floats, along: Floats, length: Floats) -> Bools:
