@@ -8,7 +8,6 @@ from tbcad.core.optics.lamp_light import RectangularLamps
 from tbcad.core.optics.mirror_light import Lamps
 from tbcad.light.simulate.object_files.finish import Finish
 from tbcad.light.simulate.scene.cast_light import (
-    Gloss,
     Lit,
     Source,
     cast_light,
@@ -18,6 +17,7 @@ from tbcad.light.simulate.scene.cast_light import (
     led_sources,
     open_share,
 )
+from tbcad.light.simulate.scene.highlights import Gloss
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import (
     LAMP_LIGHT,
