@@ -298,7 +298,7 @@ def test_a_lens_that_darkens_one_side_does_not_shift_a_highlight() -> None:
     zero = np.zeros((1, 2))
     dome = np.diag(WIDTH_PX**2 - BLUR_PX**2)[None]
     sure = np.ones(1, dtype=bool)
-    expected = Expected(ONE, ONE, ONE, zero, zero, dome, zero, np.ones(1), sure)
+    expected = Expected(ONE, ONE, ONE, zero, zero, dome, zero, np.ones(1), sure, 1j * zero)
     darker = replace(expected, brighter=SLOPE[None])
     plain, right = (highlights_of(one, ONE, found, 0.01).pixel[0] for one in (expected, darker))
     assert plain - PLACE == pytest.approx(WIDTH_PX**2 * SLOPE, rel=0.05)
