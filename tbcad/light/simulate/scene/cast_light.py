@@ -50,6 +50,7 @@ class CastLight:
     total: Floats  # light on corners, (v, 2)
     rest: Floats  # of all that is no lamp, (v, 2)
     face: Floats  # of the sources: place and half sides, mm, (l, 9)
+    white: float  # light that is shown as white
 
 
 def lamp_sources(lamps: RectangularLamps) -> list[Source]:
@@ -116,7 +117,7 @@ def cast_light(
         front, back = np.percentile(total, EXPOSED, axis=0)
         white = float(front or back) or 1.0
     face = np.array([[source.place, *source.sides] for source in sources]).reshape(-1, 9)
-    return CastLight(shown / np.float32(white), total / white, even / white, face)
+    return CastLight(shown / np.float32(white), total / white, even / white, face, white)
 
 
 def unhidden(embree: Any, start: Floats, place: Floats) -> Bools:

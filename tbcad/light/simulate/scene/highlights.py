@@ -10,6 +10,7 @@ from tbcad.core.geometry.loop_vectors import dot, vector
 from tbcad.core.optics.microfacets import axes_about, reflected_face
 from tbcad.light.simulate.object_files.finish import Finish
 from tbcad.light.simulate.scene.cast_light import CastLight
+from tbcad.light.simulate.scene.mirror_glow import MirrorGlow, glow
 from tbcad.types import Bools, Floats, Ints
 
 
@@ -23,6 +24,7 @@ class Gloss:
 
     light: CastLight
     finish: Finish  # of the object's facets
+    mirrors: MirrorGlow | None = None  # in which lamps are seen too
 
     def highlights(
         self,
@@ -41,6 +43,9 @@ class Gloss:
         own = self.finish.of(facet)
         surface = corners, behind.astype(np.int64), own.roughness**4, own.index
         part = _highlights(spots, surface, self.light.shown, self.light.face)
+        if (one := self.mirrors) is not None:
+            shown = one.distance, one.rough, one.light, one.even
+            part += _glows(spots, surface, one.share, shown)
         return np.asarray(part[:, :1] * f0 + part[:, 1:] * (1 - f0))
 
 
@@ -69,4 +74,28 @@ def _highlights(
             even, rise = reflected_face(lamp, axes, point, back, alpha2[k], index[k])
             total[k, 0] += own * even
             total[k, 1] += own * rise
+    return total
+
+
+@compiled_loop
+def _glows(
+    spots: tuple[Floats, Floats, Floats, Floats],
+    surface: tuple[Ints, Ints, Floats, Floats],
+    share: Floats,
+    shown: tuple[float, Floats, NDArray[np.float32], Floats],
+) -> Floats:
+    """The same of the light by mirrors."""
+    weight, place, normal, ray = spots
+    corners, behind, alpha2, _ = surface
+    total = np.zeros((len(place), 2))
+    for k in range(len(place)):
+        axes = vector(normal[k]), vector(ray[k])
+        if dot(*axes) >= 0 or not alpha2[k] >= 0:
+            continue
+        own = 0.0
+        for i in range(3):
+            own += weight[k, i] * share[corners[k, i], behind[k, i]]
+        even, rise = glow(vector(place[k]), axes, alpha2[k] ** 0.25, shown)
+        total[k, 0] += own * even
+        total[k, 1] += own * rise
     return total
