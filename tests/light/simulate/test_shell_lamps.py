@@ -71,17 +71,17 @@ def test_a_build_without_lamps_is_refused(small_design: MirrorDesign, tmp_path: 
         read_shell_lamps(tmp_path)
 
 
-@pytest.mark.parametrize(("roughness", "within"), [(0.2, 0.35), (0.5, 0.45)])
+@pytest.mark.parametrize(("roughness", "within"), [(0.3, 0.5), (0.5, 0.4)])
 def test_a_glossy_ball_shows_the_leds_by_the_mirrors(
     folder: Path, roughness: float, within: float
 ) -> None:
     """As the sum over each LED in each mirror has it: in the mean, and point by point."""
     export, lamps = read_export(folder), read_shell_lamps(folder)
     draw = np.random.default_rng(4)
-    normal = unit(draw.normal(size=(60, 3)))
+    normal = unit(draw.normal(size=(400, 3)))
     apex = np.concatenate([one.mirrors.apex for one in export.reflectors])
     place = 15 * normal
-    ray = unit(place - draw.choice(apex, 60))
+    ray = unit(place - draw.choice(apex, 400))
     sees = -(ray * normal).sum(axis=1)
     place, normal, ray = (one[sees > 0.2] for one in (place, normal, ray))
     whole = np.ones((1, 2))
@@ -105,5 +105,5 @@ def test_a_glossy_ball_shows_the_leds_by_the_mirrors(
             roots = [np.sqrt(alpha2 + (1 - alpha2) * c * c) for c in (falls, seen)]
             smith = 0.5 / (falls * roots[1] + seen * roots[0])
             exact += lux * falls * spread * smith * (0.04 + 0.96 * (1 - along) ** 5)
-    assert found.mean() == pytest.approx(exact.mean(), rel=0.15)
+    assert found.mean() == pytest.approx(exact.mean(), rel=0.2)
     assert np.sqrt(np.mean((found - exact) ** 2)) < within * np.sqrt(np.mean(exact**2))
