@@ -21,6 +21,7 @@ UP = np.array([0.0, 0.0, 1.0])
 CENTROID = 4 / (3 * np.pi)  # of a half disc, from its straight side, as a share of its radius
 STEP = 0.5  # of the differences that give a dome's image, as a share of its radius
 RINGS, SPOKES = 5, 16  # of samples of a dome
+FINER = 12, 32  # of those whose waves are summed
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def dome_images(
 
 def _wave(disc: DiscImages) -> Waves:
     """Of `DomeImages`, to first order in a disc's size."""
-    samples, share = dome_samples(disc.axes)
+    samples, share = dome_samples(disc.axes, *FINER)
     weight = (share / share.sum(axis=1, keepdims=True))[..., None]
     place = samples @ disc.axes[:, :2].swapaxes(1, 2) @ disc.slope
     middle = (weight * place).sum(axis=1, keepdims=True)
@@ -124,16 +125,16 @@ def sight_axes(toward: Floats) -> Floats:
     return np.stack([level, np.cross(toward, level), toward], axis=1)
 
 
-def dome_samples(axes: Floats) -> tuple[Floats, Floats]:
+def dome_samples(axes: Floats, rings: int = RINGS, spokes: int = SPOKES) -> tuple[Floats, Floats]:
     """Points (n, s, 3) of the lit halves of unit domes, and shares (n, s) of a disc they stand for.
 
     Points are the centroids of pieces of a disc that have the same area. Those of the lower half
     are brought nearer to its middle, up to the edge of the lit half, which an eye in elevation e
     sees as half an ellipse. Axes are those of the eyes, from `sight_axes`.
     """
-    ring, spoke = (index.ravel() for index in np.indices((RINGS, SPOKES)))
-    width = 2 * np.pi / SPOKES
-    turn, (inner, outer) = width * (spoke + 0.5), np.sqrt([ring / RINGS, (ring + 1) / RINGS])
+    ring, spoke = (index.ravel() for index in np.indices((rings, spokes)))
+    width = 2 * np.pi / spokes
+    turn, (inner, outer) = width * (spoke + 0.5), np.sqrt([ring / rings, (ring + 1) / rings])
     # Centroid of the piece of a ring that a point stands for.
     along = 2 / 3 * (outer**3 - inner**3) / (outer**2 - inner**2)
     radius = along * np.sin(width / 2) / (width / 2)
