@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
+from tbcad.core.optics.camera import Camera
 from tbcad.core.optics.lamp_light import RectangularLamps, irradiance
 from tbcad.core.optics.lens import PupilLens
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.light.simulate.capture.real import RealOptics, _band, mirror_rays, with_halo
 from tbcad.light.simulate.scene.object import SceneObject, built_in_object
+from tbcad.light.simulate.scene.ray_casting import Scene
 from tbcad.light.simulate.scene.rays import exact_tracer
 from tbcad.light.simulate.scene.real_scene import real_scene
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export
@@ -83,12 +85,12 @@ def kept(name: str) -> np.ndarray:
         return STEP * file[name].astype(np.float64)
 
 
-def at_pixels(fine: np.ndarray) -> np.ndarray:
+def at_pixels(fine: np.ndarray, camera: Camera | None = None) -> np.ndarray:
     """Pixels (h, w, c) of a picture (2 h, 2 w, c) behind the Airy pattern of 550 nm.
 
     By Fourier's transform of the whole picture: a pixel's own area, a fine one's less.
     """
-    camera = machine().reflector.camera
+    camera = camera or machine().reflector.camera
     pitch = 2 * np.tan(camera.hfov / 2) / camera.width_px
     finest = LENS.pupil_mm / 550e-6 * pitch / FINE  # cycles a fine pixel
     y, x = (np.fft.fftfreq(n) for n in fine.shape[:2])
@@ -114,6 +116,13 @@ def compared() -> np.ndarray:
     return np.where(near & inner, rays.mirror, 0)[:, left : left + columns]
 
 
+def shown(scene: Scene, lamps: RectangularLamps) -> float:
+    """Levels of `WHITE_LUX` over those of a scene, whose white is that of its own exposure."""
+    brightest = np.argmax(scene.shade[:, 0])
+    at = scene.subject.points[[brightest]], scene.subject.normals[[brightest]]
+    return float(irradiance(lamps, *at)[0] / scene.shade[brightest, 0] / WHITE_LUX)
+
+
 def our_light(subject: SceneObject, lamps: RectangularLamps, gloss: float | None) -> np.ndarray:
     """What `tbcad capture --optics real` counts before scatter and noise, of lossless mirrors.
 
@@ -121,12 +130,9 @@ def our_light(subject: SceneObject, lamps: RectangularLamps, gloss: float | None
     """
     one = machine().reflector
     scene = real_scene(machine().export, subject, lamps, gloss)
-    brightest = np.argmax(scene.shade[:, 0])
-    at = scene.subject.points[[brightest]], scene.subject.normals[[brightest]]
-    white = irradiance(lamps, *at)[0] / scene.shade[brightest, 0]
     optics = RealOptics(LENS, 1.0, np.zeros(1), ray_share=RAY_SHARE)
     left, top, columns, rows = CROP
     part = exact_tracer(one), mirror_rays(one, optics), scene, optics, range(top, top + rows)
     _, light = _band(one.camera, *part)
     whole = with_halo(light, optics.kernel(one.camera))
-    return np.asarray(whole[:, left : left + columns] * white / WHITE_LUX)
+    return np.asarray(whole[:, left : left + columns] * shown(scene, lamps))

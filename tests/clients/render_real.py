@@ -11,6 +11,7 @@ area lights. Light meets one mirror, then the object, then a lamp. No code is sh
 import json
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import maximum_filter
 
+from tbcad.core.optics.camera import Camera
 from tbcad.light.simulate.scene.object import patterned_ball
 from tests.clients.real_machine import (
     BALL_MM,
@@ -62,17 +64,30 @@ def object_file(folder: Path, part: str) -> Path:
     return path
 
 
-def by_mitsuba(mi: Any, mesh: Path, part: str, lamp: int) -> np.ndarray:
+@dataclass(frozen=True)
+class Before:
+    """A camera, the part of its picture that is rendered, and mirrors as Mitsuba's shapes."""
+
+    camera: Camera
+    crop: tuple[int, int, int, int]  # as `CROP`
+    mirrors: dict[str, Any]
+
+
+def by_mitsuba(
+    mi: Any, mesh: Path, part: str, lamp: int, before: Before | None = None
+) -> np.ndarray:
     """Luminance (2 h, 2 w, 3) of one part of the light of a lamp, lm / (sr mm^2)."""
     one = machine()
-    camera = one.reflector.camera
+    of_shell = Before(one.reflector.camera, CROP, mitsuba_mirrors(one.reflector.mirrors))
+    before = before or of_shell
+    camera = before.camera
     turned = mi.ScalarTransform4f()
     ahead = (camera.pinhole + camera.forward).tolist()
     film: dict[str, Any] = {"type": "hdrfilm", "component_format": "float32"}
     film |= {"width": FINE * camera.width_px, "height": FINE * camera.height_px}
     names = "crop_offset_x", "crop_offset_y", "crop_width", "crop_height"
-    film |= {name: FINE * value for name, value in zip(names, CROP, strict=True)}
-    shapes = mitsuba_mirrors(one.reflector.mirrors)
+    film |= {name: FINE * value for name, value in zip(names, before.crop, strict=True)}
+    shapes = dict(before.mirrors)
     place, way = one.lamps.places[lamp], one.lamps.inward[lamp]
     look = turned.look_at(place.tolist(), (place + way).tolist(), [0, 0, 1])
     shapes["lamp"] = {

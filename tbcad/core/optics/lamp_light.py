@@ -33,6 +33,12 @@ class RectangularLamps:
         middles = self.places[:, None] + x[:, None] * side[:, None] + z[:, None] * UP
         return middles.reshape(-1, 3), np.repeat(self.inward, len(x), axis=0)
 
+    def tile_sides(self) -> Floats:
+        """Half sides (t, 2, 3) of those tiles, mm."""
+        side = self.width / TILES[0] / 2 * np.cross(UP, self.inward)
+        up = np.broadcast_to(self.length / TILES[1] / 2 * UP, side.shape)
+        return np.repeat(np.stack([side, up], axis=1), TILES[0] * TILES[1], axis=0)
+
     def sources(self) -> tuple[Floats, Floats, Floats]:
         """Tiles and LEDs: places (t, 3), unit directions (t, 3) and candela along those, (t,)."""
         middles, facing = self.tiles()

@@ -9,16 +9,19 @@ higher by 4 / (3 pi) (1 - sin e) of the radius.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.optics.camera import LensCamera
 from tbcad.core.optics.reflection import reflection_points
 from tbcad.types import Floats
 
+Waves = NDArray[np.complex128]
 UP = np.array([0.0, 0.0, 1.0])
 CENTROID = 4 / (3 * np.pi)  # of a half disc, from its straight side, as a share of its radius
 STEP = 0.5  # of the differences that give a dome's image, as a share of its radius
 RINGS, SPOKES = 5, 16  # of samples of a dome
+FINER = 12, 32  # of those whose waves are summed
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,8 @@ class DomeImages:
     centroid: Floats  # of the lit part's image, from there, pixels, (n, 2)
     spread: Floats  # mean square of that image about its centroid, square pixels, (n, 2, 2)
     area: Floats  # of the lit part's image, square pixels, (n,)
+    # mean of exp(2 pi i x) over the lit part, by columns and rows x from its centroid, (n, 2)
+    wave: Waves
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,17 @@ def dome_images(
         centroid=up[:, None] * disc.slope[:, 1] + bent + more,
         spread=np.einsum("nia,ni,nib->nab", disc.slope, spread, disc.slope),
         area=disc.area * (1 + rise) / 2 * (1 + up * disc.growth[:, 1]),
+        wave=_wave(disc),
     )
+
+
+def _wave(disc: DiscImages) -> Waves:
+    """Of `DomeImages`, to first order in a disc's size."""
+    samples, share = dome_samples(disc.axes, *FINER)
+    weight = (share / share.sum(axis=1, keepdims=True))[..., None]
+    place = samples @ disc.axes[:, :2].swapaxes(1, 2) @ disc.slope
+    middle = (weight * place).sum(axis=1, keepdims=True)
+    return np.asarray((weight * np.exp(2j * np.pi * (place - middle))).sum(axis=1))
 
 
 def sight_axes(toward: Floats) -> Floats:
@@ -110,16 +125,16 @@ def sight_axes(toward: Floats) -> Floats:
     return np.stack([level, np.cross(toward, level), toward], axis=1)
 
 
-def dome_samples(axes: Floats) -> tuple[Floats, Floats]:
+def dome_samples(axes: Floats, rings: int = RINGS, spokes: int = SPOKES) -> tuple[Floats, Floats]:
     """Points (n, s, 3) of the lit halves of unit domes, and shares (n, s) of a disc they stand for.
 
     Points are the centroids of pieces of a disc that have the same area. Those of the lower half
     are brought nearer to its middle, up to the edge of the lit half, which an eye in elevation e
     sees as half an ellipse. Axes are those of the eyes, from `sight_axes`.
     """
-    ring, spoke = (index.ravel() for index in np.indices((RINGS, SPOKES)))
-    width = 2 * np.pi / SPOKES
-    turn, (inner, outer) = width * (spoke + 0.5), np.sqrt([ring / RINGS, (ring + 1) / RINGS])
+    ring, spoke = (index.ravel() for index in np.indices((rings, spokes)))
+    width = 2 * np.pi / spokes
+    turn, (inner, outer) = width * (spoke + 0.5), np.sqrt([ring / rings, (ring + 1) / rings])
     # Centroid of the piece of a ring that a point stands for.
     along = 2 / 3 * (outer**3 - inner**3) / (outer**2 - inner**2)
     radius = along * np.sin(width / 2) / (width / 2)

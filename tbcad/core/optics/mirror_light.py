@@ -122,20 +122,45 @@ def _reflected_light(
             if dot(minus(centre, place), normal) + radius <= 0:
                 continue  # all of the sphere is below the surface's horizon
             for j in range(len(lamps)):
-                lamp = vector(lamps[j])
-                point, spread = reflection(centre, radius, lamp, place)
-                way, back = minus(point, lamp), minus(point, place)
-                leaves = dot(way, vector(lamps[j], 3))
-                meets = dot(back, normal)
-                if leaves <= 0 or meets <= 0 or spread == np.inf:
-                    continue
-                if not _in_cell(i, point, spheres, neighbours, ends):
-                    continue
-                if _passes(lamp, way) < ends[2]:
-                    continue
-                both = np.sqrt(dot(way, way) * dot(back, back))
-                light[k] += lamps[j, 6] * leaves * meets / both / spread
+                back, lux = _shone(i, lamps[j], spheres, neighbours, ends, place)
+                light[k] += lux * max(dot(back, normal), 0.0)
     return light
+
+
+def light_of_mirrors(lamps: Lamps, mirrors: LitMirrors, places: Floats) -> Floats:
+    """Irradiance (m, k) by each mirror of faces at places (k, 3) that are turned to it, lux."""
+    lamp = np.column_stack([lamps.places, lamps.normals, lamps.candela])
+    spheres = np.column_stack([mirrors.centre, mirrors.radius])
+    ends = np.array([mirrors.side, mirrors.foot, 0.0])
+    return np.asarray(MM2 * _light_of_mirrors(lamp, spheres, mirrors.neighbours, ends, places))
+
+
+@compiled_loop
+def _light_of_mirrors(
+    lamps: Floats, spheres: Floats, neighbours: Ints, ends: Floats, places: Floats
+) -> Floats:
+    light = np.zeros((len(spheres), len(places)))
+    for i in range(len(spheres)):
+        for k in range(len(places)):
+            for j in range(len(lamps)):
+                light[i, k] += _shone(i, lamps[j], spheres, neighbours, ends, vector(places[k]))[1]
+    return light
+
+
+@compiled_part
+def _shone(
+    i: int, row: Floats, spheres: Floats, neighbours: Ints, ends: Floats, place: Vector
+) -> tuple[Vector, float]:
+    """Unit direction from a place to a lamp's light by mirror i, and what it gives across that."""
+    lamp = vector(row)
+    point, spread = reflection(vector(spheres[i]), spheres[i, 3], lamp, place)
+    way, back = minus(point, lamp), unit(minus(point, place))
+    leaves = dot(way, vector(row, 3))
+    if leaves <= 0 or spread == np.inf or not _in_cell(i, point, spheres, neighbours, ends):
+        return back, 0.0
+    if _passes(lamp, way) < ends[2]:
+        return back, 0.0
+    return back, row[6] * leaves / np.sqrt(dot(way, way)) / spread
 
 
 @compiled_part

@@ -167,3 +167,6 @@ def test_images_are_those_of_fine_grids() -> None:
         # To second order: an order better than what the second order adds, or than the grid.
         assert norm(centroid - found.centroid[k]) < 0.1 * bent + GRID_PX
         assert area.sum() * (2 / GRID) ** 2 == pytest.approx(found.area[k], rel=5e-3)
+        flat = at @ discs.slope[k]
+        wave = np.exp(2j * np.pi * (flat - flat.mean(axis=0))).mean(axis=0)
+        assert np.abs(wave - found.wave[k]).max() < 0.03

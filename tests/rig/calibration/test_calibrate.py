@@ -25,6 +25,7 @@ from tbcad.rig.calibration.calibrate import (
     calibrate,
     cross_validation,
     prepared_setup,
+    unbiased_estimate,
 )
 from tbcad.rig.calibration.detection.detection import Detection
 from tbcad.rig.calibration.estimate.parameters import Prior
@@ -211,6 +212,17 @@ def test_frames_that_are_not_photographed_are_missing_mirrors(setup: Setup) -> N
     result = calibrate(again, seen, again.prior(ERRORS))
     assert {name[0] for name in result.rays.ids} == {"a"}
     assert {name[0] for name in result.rays.absent} == {"b"}
+
+
+def test_what_sampling_adds_is_found_and_taken_off(setup: Setup, detection: Detection) -> None:
+    """Of a lens that passes 0.4 of lines of a cycle a pixel."""
+    prior, whole = setup.prior(ERRORS), detection.highlights
+    shift = 0.03 * np.sin(2 * np.pi * whole.pixel)
+    off = replace(whole, pixel=whole.pixel + 0.4 * shift)
+    blind = unbiased_estimate(prior, replace(detection, highlights=off))
+    found = unbiased_estimate(prior, replace(detection, highlights=off, sampling=shift))
+    assert found.highlights.pixel == pytest.approx(whole.pixel, abs=2e-3)
+    assert np.std(found.residual) < 0.9 * np.std(blind.residual)
 
 
 def test_another_size_of_photographs(setup: Setup) -> None:

@@ -12,11 +12,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from tbcad.core.optics.microfacets import NO_DIELECTRIC
 from tbcad.types import Floats, Ints
 
 F0 = 0.04  # of a dielectric of index 1.5
 MOST_DIELECTRIC = 0.2  # that diamond nearly has
-NO_DIELECTRIC = 1e9
 LEAST_ROUGHNESS = 0.05  # as that of --gloss: highlights of smoother ones are finer than pixels
 
 

@@ -1,4 +1,4 @@
-"""Light with cast shadows, lamp by lamp, at the corners of an object; and highlights of the lamps.
+"""Light with cast shadows, lamp by lamp, at the corners of an object.
 
 Facets are cut so small that shadows between corners are sharp to `SHADOW_MM`.
 """
@@ -11,14 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tbcad.common.compiled import compiled_loop
-from tbcad.core.geometry.loop_vectors import dot as loop_dot
-from tbcad.core.geometry.loop_vectors import minus, plus_scaled, unit, vector
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.geometry.vectors import unit as unit_rows
 from tbcad.core.optics.lamp_light import RectangularLamps, lambertian
-from tbcad.core.optics.mirror_light import Lamps, direct_light
-from tbcad.light.simulate.object_files.finish import NO_DIELECTRIC, Finish
+from tbcad.core.optics.mirror_light import MM2, Lamps
 from tbcad.light.simulate.scene.lamps import EXPOSED, free_rays
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.types import Bools, Floats, Ints
@@ -29,12 +25,8 @@ SAME = 1e-6  # of corners that are one, mm, and of their normals
 LIFT_MM = 0.02  # of corners above the surface, where rays toward lamps begin
 FAR_MM = 1e6  # of lamps that are a direction
 SKY_RAYS = 96  # directions by which it is found how much of the mirrors' light reaches a corner
-# Cosine below which light that falls along a surface is taken as falling at it: between corners it
-# is not known better.
-GRAZING = 0.1
-# Of a lamp's area over its squared distance, what is added to alpha^2: the lobe of a perfect mirror
-# is then as high as that of a disc which sends light evenly from the lamp.
-WIDER = 1 / (4 * np.pi)
+SUN = 0.00825  # side of a square as large as the sun, seen from far: of lamps that are a direction
+LED_MM = 2.66  # side of a square as large as a lit dome of 3 mm
 
 Lit = Callable[[Floats, Floats], Floats]
 """Light (n,) without shadows on points (n, 3) with unit normals (n, 3)."""
@@ -46,44 +38,47 @@ class Source:
 
     place: Floats  # mm, (3,)
     light: Lit
-    area: float = 0.0  # of its face, mm^2
+    sides: Floats  # half sides of its face, mm, (2, 3)
+    exitance: float  # of its face, lux: pi times its luminance
 
 
 @dataclass(frozen=True)
 class CastLight:
     """Light at corners (v,), outside and behind, as shares of what is shown as white."""
 
-    lamp: NDArray[np.float32]  # of each of l sources, (v, 2, l)
+    shown: NDArray[np.float32]  # exitance of each of l sources, 0 where it is hidden, (v, 2, l)
+    total: Floats  # light on corners, (v, 2)
     rest: Floats  # of all that is no lamp, (v, 2)
-    place: Floats  # of the sources, mm, (l, 3)
-    area: Floats  # of their faces, mm^2, (l,)
-
-    @property
-    def total(self) -> Floats:
-        """All of it, (v, 2)."""
-        return np.asarray(self.lamp.sum(axis=2, dtype=np.float64) + self.rest)
+    face: Floats  # of the sources: place and half sides, mm, (l, 9)
+    white: float  # light that is shown as white
 
 
 def lamp_sources(lamps: RectangularLamps) -> list[Source]:
     """The tiles of a prototype's lamps, and its LEDs above, lux."""
     places, facing, candela = lamps.sources()
-    tiles, count = len(places) - len(lamps.leds), len(lamps.places)
-    tile = lamps.width * lamps.length * count / tiles
-    area = np.repeat([tile, 0.0], [tiles, len(lamps.leds)]).tolist()
-    each = zip(places[:, None], facing[:, None], candela[:, None], strict=True)
-    return [
-        Source(one[0][0], partial(lambertian, *one), size)
-        for one, size in zip(each, area, strict=True)
-    ]
+    sides = [*lamps.tile_sides(), *(square_sides(way, LED_MM) for way in -unit_rows(lamps.leds))]
+    each = zip(places, facing, candela, strict=True)
+    return [_source(one, half) for one, half in zip(each, sides, strict=True)]
 
 
 def led_sources(lamps: Lamps) -> list[Source]:
     """The LEDs of a shell's cameras, straight onto the object, lux."""
-    single = [
-        Lamps(*(values[k : k + 1] for values in (lamps.places, lamps.normals, lamps.candela)))
-        for k in range(len(lamps.places))
-    ]
-    return [Source(one.places[0], partial(direct_light, one)) for one in single]
+    each = zip(lamps.places, lamps.normals, lamps.candela, strict=True)
+    return [_source(one, square_sides(one[1], LED_MM)) for one in each]
+
+
+def _source(one: tuple[Floats, Floats, float], sides: Floats) -> Source:
+    """A small Lambertian face at a place, its normal and candela along it, with half sides."""
+    place, facing, candela = one
+    area = 4 * np.linalg.norm(np.cross(*sides))
+    light = partial(lambertian, place[None], facing[None], np.array([candela]))
+    return Source(place, light, sides, np.pi * MM2 * candela / area)
+
+
+def square_sides(normal: Floats, side: float) -> Floats:
+    """Half sides (2, 3) of a square with a unit normal (3,)."""
+    first = unit_rows(np.cross(np.eye(3)[np.abs(normal).argmin()], normal))
+    return side / 2 * np.stack([first, np.cross(normal, first)])
 
 
 def direction_sources(directions: Floats, weights: Floats) -> list[Source]:
@@ -92,8 +87,10 @@ def direction_sources(directions: Floats, weights: Floats) -> list[Source]:
     def light(way: Floats, weight: float) -> Lit:
         return lambda _, normals: weight * np.maximum(normals @ way, 0.0)
 
-    pairs = zip(directions, weights.tolist(), strict=True)
-    return [Source(FAR_MM * way, light(way, w)) for way, w in pairs]
+    return [
+        Source(FAR_MM * way, light(way, w), square_sides(way, SUN * FAR_MM), np.pi * w / SUN**2)
+        for way, w in zip(directions, weights.tolist(), strict=True)
+    ]
 
 
 def cast_light(
@@ -103,23 +100,24 @@ def cast_light(
 
     `rest` is light of no lamp. `white`: what is shown as white; None: that of a good exposure.
     """
-    light = np.zeros((len(subject.points), 2, len(sources)), dtype=np.float32)
-    even = np.zeros((len(subject.points), 2))
+    shown = np.zeros((len(subject.points), 2, len(sources)), dtype=np.float32)
+    total, even = np.zeros((2, len(subject.points), 2))
     for side, sign in enumerate((1.0, -1.0)):
         normals = sign * subject.normals
         start = subject.points + LIFT_MM * normals
         for k, source in enumerate(sources):
             own = source.light(subject.points, normals)
-            own[own > 0] *= unhidden(embree, start[own > 0], source.place)
-            light[:, side, k] = own
+            lit = np.flatnonzero(own > 0)
+            lit = lit[unhidden(embree, start[lit], source.place)]
+            total[lit, side] += own[lit]
+            shown[lit, side, k] = source.exitance
         even[:, side] = rest(subject.points, normals)
+    total += even
     if white is None:
-        whole = light.sum(axis=2, dtype=np.float64) + even
-        front, back = np.percentile(whole, EXPOSED, axis=0)
+        front, back = np.percentile(total, EXPOSED, axis=0)
         white = float(front or back) or 1.0
-    places = np.array([source.place for source in sources])
-    area = np.array([source.area for source in sources])
-    return CastLight(light / np.float32(white), even / white, places, area)
+    face = np.array([[source.place, *source.sides] for source in sources]).reshape(-1, 9)
+    return CastLight(shown / np.float32(white), total / white, even / white, face, white)
 
 
 def unhidden(embree: Any, start: Floats, place: Floats) -> Bools:
@@ -197,93 +195,3 @@ def _lattice(count: int) -> Floats:
                 pieces.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
     second: Floats = np.array(pieces, dtype=np.float64) / count
     return np.asarray(np.concatenate([1 - second.sum(axis=2, keepdims=True), second], axis=2))
-
-
-@dataclass(frozen=True)
-class Gloss:
-    """How a glossy object reflects its lamps: microfacets after GGX, by Smith's shadowing.
-
-    Source: B. Walter and others, Microfacet Models for Refraction, EGSR 2007; alpha is the square
-    of the roughness, as in glTF. Dielectrics reflect by Fresnel's equations, metals by C. Schlick,
-    Computer Graphics Forum 13, 1994, which lacks up to a fifth of a dielectric's.
-    """
-
-    light: CastLight
-    finish: Finish  # of the object's facets
-
-    def highlights(
-        self,
-        facet: Ints,
-        corners: Ints,
-        behind: Bools,
-        spots: tuple[Floats, Floats, Floats, Floats],
-        f0: Floats,
-    ) -> Floats:
-        """Light (k, 3) that goes back along rays from spots on facets (k,) with corners (k, 3).
-
-        `behind` as of SurfaceHits; spots: barycentric weights, places, unit normals, and directions
-        of the rays, (k, 3) each; `f0`: shares (k, 3) reflected at normal incidence. 1 is that of a
-        matt white surface in full light.
-        """
-        own, one = self.finish.of(facet), self.light
-        lamps = one.lamp, one.place, one.area
-        surface = corners, behind.astype(np.int64), own.roughness**4, own.index
-        part = _highlights(spots, surface, lamps)
-        return np.asarray(part[:, :1] * f0 + part[:, 1:] * (1 - f0))
-
-
-@compiled_loop
-def _highlights(
-    spots: tuple[Floats, Floats, Floats, Floats],
-    surface: tuple[Ints, Ints, Floats, Floats],
-    lamps: tuple[NDArray[np.float32], Floats, Floats],
-) -> Floats:
-    """What is to be multiplied by F0, and by 1 - F0, (k, 2). Lamps of an area widen the lobe."""
-    weight, place, normal, ray = spots
-    corners, behind, alpha2, index = surface
-    light, lamp, area = lamps
-    total = np.zeros((len(place), 2))
-    for k in range(len(place)):
-        point, upward, back = vector(place[k]), vector(normal[k]), vector(ray[k])
-        sees = -loop_dot(back, upward)
-        if sees <= 0 or not alpha2[k] >= 0:  # NaN: matt
-            continue
-        for j in range(len(lamp)):
-            own = 0.0
-            for i in range(3):
-                own += weight[k, i] * light[corners[k, i], behind[k, i], j]
-            if own <= 0:
-                continue
-            toward = minus(vector(lamp[j]), point)
-            way = unit(toward)
-            falls = loop_dot(way, upward)
-            if falls <= 0:
-                continue
-            a2 = alpha2[k] + WIDER * area[j] / loop_dot(toward, toward)
-            half = unit(plus_scaled(way, -1.0, back))
-            up, along = loop_dot(half, upward), -loop_dot(half, back)
-            spread = a2 / (up * up * (a2 - 1) + 1) ** 2  # of the normals, times pi
-            falls = max(falls, GRAZING)
-            smith = 0.5 / (
-                falls * np.sqrt(sees * sees * (1 - a2) + a2)
-                + sees * np.sqrt(falls * falls * (1 - a2) + a2)
-            )
-            total[k, 0] += own * spread * smith
-            total[k, 1] += own * spread * smith * _fresnel_rise(along, index[k])
-    return total
-
-
-@compiled_loop
-def _fresnel_rise(cosine: float, index: float) -> float:
-    """How far reflection has risen from that at normal incidence, 0, to 1, as at grazing.
-
-    Of a dielectric of an index by Fresnel's equations, unpolarised; without one by Schlick.
-    """
-    if index >= NO_DIELECTRIC:
-        return (1 - cosine) ** 5
-    inner = np.sqrt(index * index - 1 + cosine * cosine)
-    across = (cosine - inner) / (cosine + inner)
-    along = (index * index * cosine - inner) / (index * index * cosine + inner)
-    normal = ((index - 1) / (index + 1)) ** 2
-    rise: float = ((across * across + along * along) / 2 - normal) / (1 - normal)
-    return rise

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tbcad.core.geometry.vectors import dot, facet_vectors, unit
 from tbcad.core.optics.reflection import reflect
 from tbcad.light.simulate.parallel import over_chunks
-from tbcad.light.simulate.scene.cast_light import Gloss
+from tbcad.light.simulate.scene.highlights import Gloss
 from tbcad.light.simulate.scene.lamps import PointLights, Spots, lamp_light
 from tbcad.light.simulate.scene.object import SceneObject, pattern
 from tbcad.light.simulate.scene.rays import meets_sphere

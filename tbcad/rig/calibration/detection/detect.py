@@ -27,6 +27,7 @@ from tbcad.rig.calibration.detection.matching import (
     highlights_of,
     match,
     maybe_hidden,
+    sampling_shifts,
     shift_of,
 )
 from tbcad.rig.calibration.detection.spots import (
@@ -111,7 +112,8 @@ def detect(
     highlights = highlights_of(expected, paired, spots, sigma[np.maximum(partner, 0)])
     places = np.column_stack([expected.frame, expected.sphere, expected.led])[~used].tolist()
     rejected = dict(zip(map(tuple, places), reasons[~used].tolist(), strict=True))
-    return Detection(highlights, rejected, tuple(faults))
+    sampling = sampling_shifts(expected, paired)
+    return Detection(highlights, rejected, tuple(faults), sampling)
 
 
 def _read_frames(run: Run, leds: int, progress: Progress) -> list[_Read]:

@@ -7,7 +7,7 @@ run's record in the same order.
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TypeAlias
 
@@ -65,6 +65,8 @@ class Detection:
     rejected: Mapping[tuple[int, int, int], str]
     # of photographs, LEDs and frames, each in one line that names what, and what is done
     faults: tuple[str, ...]
+    # of each highlight by the sampling of its spot, as of `sampling_shifts`, (n, 2), or none
+    sampling: Floats = field(default_factory=lambda: np.zeros(2))
 
 
 def no_highlights(

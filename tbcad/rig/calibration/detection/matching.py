@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from tbcad.core.geometry.vectors import dot, norm, unit
 from tbcad.core.optics.camera import vignetting, vignetting_slope
-from tbcad.core.optics.led_dome import dome_images
+from tbcad.core.optics.led_dome import Waves, dome_images
 from tbcad.light.simulate.scene.reflector import ExportedDesign
 from tbcad.rig.calibration.detection.spots import BrightSpots, stacked
 from tbcad.rig.calibration.estimate.parameters import Prior
@@ -65,6 +65,7 @@ class Expected:
     brighter: Floats  # share by which the lens lets more light through a pixel on, (n, 2)
     light: Floats  # area of the image times the lens's share of light there, square pixels, (n,)
     inside: Bools  # whether it is whole in the picture, (n,)
+    wave: Waves  # of its image, as of DomeImages, (n, 2)
 
 
 def expected_highlights(machine: Machine, dome: float) -> Expected:
@@ -89,6 +90,7 @@ def expected_highlights(machine: Machine, dome: float) -> Expected:
         brighter=vignetting_slope(camera, image.place),
         light=image.area * through,
         inside=inside & ahead,
+        wave=image.wave,
     )
 
 
@@ -211,6 +213,18 @@ def highlights_of(
     return Highlights(
         expected.frame[which], expected.sphere[which], expected.led[which], pixel, known
     )
+
+
+def sampling_shifts(expected: Expected, partner: Ints) -> Floats:
+    """Pixels by which paired spots' centroids are off by sampling, for a lens's contrast of 1.
+
+    Pixels take the light of their area, so a centroid of them is exact but for lines of one cycle
+    a pixel, of which they pass none, but their slope: by Poisson's sum it is off by
+    -1 / pi times the mean of sin(2 pi x) over the light, and the contrast of its blur, (n, 2).
+    """
+    which = partner >= 0
+    phase = np.exp(2j * np.pi * (expected.pixel + expected.centroid)[which])
+    return np.asarray(-(expected.wave[which] * phase).imag / np.pi)
 
 
 def _estimated(

@@ -1,24 +1,19 @@
 """Cast shadows and highlights against closed forms."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tbcad.core.geometry.vectors import facet_vectors, norm
-from tbcad.core.optics import lamp_light
-from tbcad.core.optics.lamp_light import RectangularLamps
 from tbcad.light.simulate.object_files.finish import F0, Finish
 from tbcad.light.simulate.scene.cast_light import (
     CastLight,
-    Gloss,
     Source,
     cast_light,
     cut_small,
     direction_sources,
-    lamp_sources,
     open_share,
 )
+from tbcad.light.simulate.scene.highlights import Gloss
 from tbcad.light.simulate.scene.object import SceneObject
 from tbcad.light.simulate.scene.ray_casting import Scene, cast_rays, embree_scene
 from tbcad.types import Floats
@@ -125,24 +120,3 @@ def test_a_dielectric_reflects_by_fresnel_and_a_metal_its_colour() -> None:
     assert (glass - matt) / whole == pytest.approx(0.0892, rel=2e-3)
     colour = np.array([0.9, 0.6, 0.3])
     assert metal / whole == pytest.approx(colour + (1 - colour) / 32, rel=2e-3)
-
-
-def test_a_lamp_is_seen_as_large_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Against 1,000 points of its face; its middle alone has a highlight of half the width."""
-    lamps = RectangularLamps(np.array([[0.0, 100, 60]]), np.array([[0.0, -1, 0]]), 16, 50, 100)
-    y = np.linspace(-15, 15, 13)
-    start = np.column_stack([0 * y, y, 0 * y])
-    back = np.array([0.0, -100, 60]) - start
-    back /= norm(back)[:, None]
-
-    def shown(sources: list[Source]) -> Floats:
-        glossy, matt = (
-            cast_rays(shiny(finish, sources, 1e6), start + 40 * back, -back).colour[:, 0]
-            for finish in (Finish.even(2, 0.3), Finish.even(2))
-        )
-        return np.asarray(glossy - matt)
-
-    tiles = shown(lamp_sources(lamps))
-    monkeypatch.setattr(lamp_light, "TILES", (20, 50))
-    exact = shown([replace(one, area=0.0) for one in lamp_sources(lamps)])
-    assert tiles == pytest.approx(exact, rel=0.03)

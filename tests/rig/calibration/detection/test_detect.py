@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.ndimage import gaussian_filter
+from scipy.special import j1
 
 from tbcad.errors import InputError
 from tbcad.records.run import exposure_name
@@ -19,6 +21,7 @@ from tbcad.rig.calibration.detection.matching import (
     Room,
     expected_highlights,
     highlights_of,
+    sampling_shifts,
 )
 from tbcad.rig.calibration.detection.spots import find_spots
 from tbcad.rig.machine.machine import Highlights
@@ -298,8 +301,26 @@ def test_a_lens_that_darkens_one_side_does_not_shift_a_highlight() -> None:
     zero = np.zeros((1, 2))
     dome = np.diag(WIDTH_PX**2 - BLUR_PX**2)[None]
     sure = np.ones(1, dtype=bool)
-    expected = Expected(ONE, ONE, ONE, zero, zero, dome, zero, np.ones(1), sure)
+    expected = Expected(ONE, ONE, ONE, zero, zero, dome, zero, np.ones(1), sure, 1j * zero)
     darker = replace(expected, brighter=SLOPE[None])
     plain, right = (highlights_of(one, ONE, found, 0.01).pixel[0] for one in (expected, darker))
     assert plain - PLACE == pytest.approx(WIDTH_PX**2 * SLOPE, rel=0.05)
     assert right == pytest.approx(PLACE, abs=0.05 * np.abs(WIDTH_PX**2 * SLOPE).max())
+
+
+@pytest.mark.parametrize("radius", [0.45, 0.9])
+def test_sampling_shifts_a_sharp_spot_as_its_wave_says(radius: float) -> None:
+    """An even disc, a lens of a sigma of 0.25 px, and pixels that are all sensitive."""
+    fine, zero, blur = 40, np.zeros((1, 2)), 0.25
+    across = (np.arange(15 * fine) + 0.5) / fine - 0.5
+    wave = np.full((1, 2), j1(2 * np.pi * radius) / (np.pi * radius) + 0j)
+    dome, sure = np.zeros((1, 2, 2)), np.ones(1, dtype=bool)
+    for place in ([7.2, 6.9], [6.6, 7.33], [7.05, 7.4]):
+        at = np.array([place])
+        expected = Expected(ONE, ONE, ONE, at, zero, dome, zero, np.ones(1), sure, wave)
+        x, y = np.meshgrid(across - place[0], across - place[1])
+        disc = gaussian_filter((x**2 + y**2 < radius**2).astype(float), blur * fine)
+        image = np.rint(60_000 * disc.reshape(15, fine, 15, fine).mean(axis=(1, 3)))
+        found, _ = find_spots(np.dstack([image.astype(np.uint16)] * 3), None, 0, 0)
+        shift = np.exp(-2 * (np.pi * blur) ** 2) * sampling_shifts(expected, ONE)[0]
+        assert found.pixel[0] - place == pytest.approx(shift, abs=2e-3)
