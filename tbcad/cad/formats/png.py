@@ -28,7 +28,7 @@ def plain_png(data: bytes) -> Bytes | None:
     if not data.startswith(SIGNATURE):
         return None
     found = list(_chunks(data))
-    if not {kind for kind, _ in found} == PLAIN or found[-1][0] != b"IEND":
+    if {kind for kind, _ in found} != PLAIN or found[-1][0] != b"IEND":
         return None
     head = found[0][1]
     width, height = (int.from_bytes(head[at : at + 4], "big") for at in (0, 4))

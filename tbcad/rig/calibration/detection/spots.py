@@ -163,8 +163,8 @@ def _measured(
 
 def _median(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
     """Of each colour of pixels (m, 3), to the bit that of numpy, in a quarter of its time."""
-    middle, ordered = len(numbers) // 2, np.sort(numbers, axis=0)
-    return ordered[middle] if len(numbers) % 2 else ordered[middle - 1 : middle + 1].mean(axis=0)
+    ordered, count = np.sort(numbers, axis=0), len(numbers)
+    return np.asarray(ordered[(count - 1) // 2 : count // 2 + 1].mean(axis=0))
 
 
 def _colour_noise(light: NDArray[np.float64]) -> float:
