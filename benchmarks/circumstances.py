@@ -1,7 +1,8 @@
-"""What one must know to read the figures of a run."""
+"""A program's arguments, and what one must know to read the figures of a run."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import platform
@@ -9,7 +10,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tbcad.version import __version__
 
@@ -17,6 +18,26 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 RESULTS = Path(__file__).parent / "results"
+
+
+def asked(
+    about: str, name: str, *own: tuple[str, Mapping[str, Any]], rounds: int | None = None
+) -> argparse.Namespace:
+    """Arguments of a program: its own, and `out`, by default results/NAME.json.
+
+    With `rounds` where they have a default, and the circumstances before any work as `about`.
+    """
+    parser = argparse.ArgumentParser(
+        description=about, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    for flag, how in own:
+        parser.add_argument(flag, **how)
+    if rounds is not None:
+        parser.add_argument("--rounds", type=int, default=rounds, help="how often each is run")
+    parser.add_argument("--out", type=Path, default=RESULTS / f"{name}.json", help="file to write")
+    found = parser.parse_args(namespace=argparse.Namespace(rounds=1))
+    found.about = {**circumstances(), "rounds": found.rounds}
+    return found
 
 
 def circumstances() -> dict[str, object]:

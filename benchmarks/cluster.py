@@ -6,14 +6,13 @@ take and a round trip to a far worker, on up to 64 workers: what scheduler and c
 
 from __future__ import annotations
 
-import argparse
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from circumstances import RESULTS, circumstances, show_and_write
+from circumstances import asked, show_and_write
 from distributed import LocalCluster
 from timing import Figure, Row, at_least, measured
 
@@ -102,15 +101,7 @@ def cluster(workers: int, processes: bool = False) -> Iterator[str]:
         yield made.scheduler_address
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure, and write results/cluster.json."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("export", type=Path)
-    parser.add_argument("--out", type=Path, default=RESULTS / "cluster.json")
-    asked = parser.parse_args(arguments)
-    about = {**circumstances(), "rounds": 1}
-    show_and_write(asked.out, about, [*builds(asked.export), *efficiency(), *connections()])
-
-
 if __name__ == "__main__":
-    main()
+    given = asked(__doc__ or "", "cluster", ("export", {"type": Path}))
+    found = [*builds(given.export), *efficiency(), *connections()]
+    show_and_write(given.out, given.about, found)

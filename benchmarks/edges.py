@@ -84,9 +84,8 @@ def mesh(made: MirrorDesign) -> object:
 if __name__ == "__main__":
     import tempfile
 
-    from circumstances import RESULTS, circumstances, show_and_write
+    from circumstances import asked, show_and_write
 
-    about = {**circumstances(), "rounds": 1}
+    given = asked(__doc__ or "", "edges", rounds=1)
     with tempfile.TemporaryDirectory() as name:
-        found = edges(Path(name), rounds=1)
-    show_and_write(RESULTS / "edges.json", about, found)
+        show_and_write(given.out, given.about, edges(Path(name), given.rounds))

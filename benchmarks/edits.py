@@ -1,18 +1,17 @@
 """A build after one changed key beside the same build from nothing, in turns.
 
-python benchmarks/edits.py            n = 18
-python benchmarks/edits.py --n 6
+python benchmarks/edits.py                           n = 18
+python benchmarks/edits.py --n 6 --only stage light
 """
 
 from __future__ import annotations
 
-import argparse
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 
 from builds import run
-from circumstances import RESULTS, circumstances, show_and_write
+from circumstances import asked, show_and_write
+from timing import Row
 
 EDITS = {
     "stage": "prototype.stage.led_ma=12",
@@ -21,42 +20,32 @@ EDITS = {
     "balls": "prototype.ball_margin_mm=0.1",
     "shells": "mirrors.margin_mm=0.6",
 }
-LIMIT = 0.35  # of a build from nothing, for stage, light and camera
+LIMIT, LIMITED = 0.35, ("stage", "light", "camera")  # of a build from nothing
 
 
-@dataclass(frozen=True)
-class Edit:
-    """Seconds on the clock and of all cores: of the edit, and of the same build from nothing."""
-
-    name: str
-    seconds: float
-    cpu: float
-    fresh_seconds: float
-    fresh_cpu: float
-    share: float  # of the cores' seconds
-
-
-def edit(folder: Path, name: str, n: str) -> Edit:
+def edit(folder: Path, name: str, n: str) -> list[Row]:
     """Build, change a key and build again with what was kept, then from nothing."""
     words = "build", "--n", n, "--out", str(folder / "out")
     kept = {"TBCAD_CACHE": str(folder / name)}
     run(folder, *words, environment=kept)
     after = run(folder, *words, "--set", EDITS[name], environment=kept)
     fresh = run(folder, *words, "--set", EDITS[name])
-    share = after.cpu / fresh.cpu
-    return Edit(name, after.seconds, after.cpu, fresh.seconds, fresh.cpu, round(share, 3))
-
-
-def main() -> None:
-    """Measure all edits, print them and write edits.json."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--n", default="18")
-    n = parser.parse_args().n
-    about = {**circumstances(), "n": n, "limit": LIMIT}
-    with tempfile.TemporaryDirectory() as name:
-        rows = [edit(Path(name), one, n) for one in EDITS]
-    show_and_write(RESULTS / "edits.json", about, rows)
+    share = Row("- of it", (after.cpu / fresh.cpu,), "", LIMIT if name in LIMITED else None)
+    return [
+        Row(f"n = {n}, {EDITS[name]}, from nothing, of all cores", (fresh.cpu,), "s"),
+        Row("- after a build without it", (after.cpu,), "s"),
+        share,
+        Row("- of its seconds on the clock", (after.seconds / fresh.seconds,)),
+    ]
 
 
 if __name__ == "__main__":
-    main()
+    given = asked(
+        __doc__ or "",
+        "edits",
+        ("--n", {"default": "18"}),
+        ("--only", {"nargs": "*", "default": [*EDITS], "choices": [*EDITS]}),
+    )
+    with tempfile.TemporaryDirectory() as name:
+        found = [row for one in given.only for row in edit(Path(name), one, given.n)]
+    show_and_write(given.out, given.about, found)

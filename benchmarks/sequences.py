@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
-from circumstances import RESULTS, circumstances, show_and_write
+from circumstances import asked, show_and_write
 from timing import Figure, Row, at_least, at_most, measured
 
 from tbcad.light.simulate.capture.light_field import LightField
@@ -73,18 +72,8 @@ def rates(work: Callable[[], object]) -> tuple[float, float]:
     return FRAMES / taken, cpu / FRAMES
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Measure sequences and write a JSON file.")
-    parser.add_argument("captures", type=Path, nargs="+", help="folders written by tbcad capture")
-    parser.add_argument("--rounds", type=int, default=3, help="how often each is run (default: 3)")
-    parser.add_argument("--out", type=Path, default=RESULTS / "sequences.json")
-    options = parser.parse_args()
-    about = {**circumstances(), "rounds": options.rounds}
-    with tempfile.TemporaryDirectory() as name:
-        parts = [sequences(one, Path(name), options.rounds) for one in options.captures]
-    rows = [row for part in parts for row in part]
-    show_and_write(options.out, about, rows)
-
-
 if __name__ == "__main__":
-    main()
+    given = asked(__doc__ or "", "sequences", ("captures", {"type": Path, "nargs": "+"}), rounds=3)
+    with tempfile.TemporaryDirectory() as name:
+        parts = [sequences(one, Path(name), given.rounds) for one in given.captures]
+    show_and_write(given.out, given.about, [row for part in parts for row in part])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import sys
 import tempfile
@@ -17,7 +16,7 @@ from http.client import HTTPConnection
 from pathlib import Path
 from typing import Literal
 
-from circumstances import RESULTS, circumstances, show_and_write
+from circumstances import asked, show_and_write
 from timing import Figure, Row, at_least, measured
 
 from tbcad import Views
@@ -181,21 +180,17 @@ def in_chromium(
         return [rates(turned) for _ in range(rounds)]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Measure tbcad show and write a JSON file.")
-    parser.add_argument("capture", type=Path, help="folder written by tbcad capture, n = 18")
-    parser.add_argument("--rounds", type=int, default=3, help="how often each is run (default: 3)")
-    parser.add_argument("--alone", action="store_true", help="leave out `tbcad show`")
-    parser.add_argument("--out", type=Path, default=RESULTS / "showing.json")
-    options = parser.parse_args()
-    about = {**circumstances(), "rounds": options.rounds}
-    rows = synthesised(options.capture, options.rounds)
-    if not options.alone:
-        rows += showing(options.capture, options.rounds)
-        if (field := options.capture / NAME).is_file():
-            rows += field_shown(field, options.rounds)
-    show_and_write(options.out, about, rows)
-
-
 if __name__ == "__main__":
-    main()
+    given = asked(
+        __doc__ or "",
+        "showing",
+        ("capture", {"type": Path, "help": "folder written by tbcad capture, n = 18"}),
+        ("--alone", {"action": "store_true", "help": "leave out `tbcad show`"}),
+        rounds=3,
+    )
+    found = synthesised(given.capture, given.rounds)
+    if not given.alone:
+        found += showing(given.capture, given.rounds)
+        if (field := given.capture / NAME).is_file():
+            found += field_shown(field, given.rounds)
+    show_and_write(given.out, given.about, found)

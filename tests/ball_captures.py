@@ -22,7 +22,12 @@ def without_trials(monkeypatch: pytest.MonkeyPatch) -> None:
     """No trials, which take long: one is told of, and the settings stay as they are."""
 
     def unchanged(
-        _: CapturedRays, __: Bools, settings: Settings, orders: tuple[int, ...], told: Progress
+        _: CapturedRays,
+        __: Bools,
+        settings: Settings,
+        orders: tuple[int, ...],
+        told: Progress,
+        scheduler: str | None,
     ) -> tuple[Settings, list[Trial]]:
         told("trial 1")
         kept = replace(settings, order=orders[-1])

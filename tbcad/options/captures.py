@@ -113,6 +113,10 @@ class ReconstructOptions(Call):
     """A picture (.png) that is written after each epoch."""
     seed: Annotated[int, typer.Option(min=0, max=2**63 - 1)] = 0
     """Of all that is random."""
+    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS")] = None
+    """Dask scheduler, such as tcp://host:8786: its workers try weights and view dependence at the
+    same time. The fit runs on this machine: each of its steps changes the whole field, which would
+    take longer to send than to work out."""
     resume: bool = False
     """Go on with what was interrupted; with a field, make what is missing."""
     force: ForceFile = False

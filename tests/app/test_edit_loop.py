@@ -4,6 +4,7 @@ import random
 from pathlib import Path
 
 import pytest
+from tbcad_verify.run.processes import Processes
 
 from tbcad.app.api import build
 from tbcad.common import reuse
@@ -60,6 +61,46 @@ def test_what_is_built_again_is_the_same(kept_in: Path, tmp_path: Path) -> None:
         file.write_bytes(data[:-1] if len(data) % 2 else data[:-1] + bytes([data[-1] ^ 1]))
     assert built() == (first, [])
     assert built(fresh=True) == (first, [])
+
+
+OF_PROTOTYPE = (
+    ("prototype.stage.led_ma=8", "prototype.light.segments=2"),
+    ("prototype.stage.led_ma=12", "prototype.frame.camera_travel_mm=25"),
+)
+
+
+def shells(out: Path, settings: tuple[str, ...]) -> list[str]:
+    """Build shells of a small design, and give what the build says."""
+    said: list[str] = []
+    build(
+        None,
+        out,
+        settings=[*SMALL, *settings],
+        parts="shell",
+        verify=False,
+        answer=said.append,
+    )
+    return said
+
+
+def test_two_builds_at_once_and_one_after_them_give_the_bytes_of_a_fresh_one(
+    kept_in: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of edits of the prototype, from which shells do not follow, in one store."""
+    places = [tmp_path / "one", tmp_path / "other"]
+    with Processes(2) as workers:
+        pairs = zip(places, OF_PROTOTYPE, strict=True)
+        for building in [workers.submit(shells, *each) for each in pairs]:
+            building.result()
+    (line,) = shells(tmp_path / "edited", OF_PROTOTYPE[0])
+    assert {"mirrors", "shells"} <= {*line.removeprefix("reused: ").split("; ")[0].split(", ")}
+    monkeypatch.setenv(VARIABLE, "")
+    assert shells(tmp_path / "fresh", OF_PROTOTYPE[0]) == []
+    one, other, edited = map(contents, (*places, tmp_path / "edited"))
+    assert one == edited == contents(tmp_path / "fresh")
+    changed = {name for name in one if one[name] != other[name]}
+    assert changed
+    assert not [name for name in changed if name.startswith(("shell_", "mirrors"))]
 
 
 @pytest.mark.slow

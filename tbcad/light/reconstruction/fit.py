@@ -4,12 +4,16 @@ Each batch is cut into a fixed number of parts, each with a gradient of its own,
 their order: the result is the same, to the last bit, on any number of threads.
 """
 
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil, cos, pi
+from typing import TypeAlias
 
 import numpy as np
 
+from tbcad.common.schedule import one_client, run_units
 from tbcad.light.reconstruction.field import LONGEST_LEAP, Field, Grid
 from tbcad.light.reconstruction.gradient import (
     ColumnSteps,
@@ -195,24 +199,80 @@ def chosen(
     settings: Settings,
     orders: tuple[int, ...],
     progress: Progress,
+    scheduler: str | None = None,
 ) -> tuple[Settings, list[Trial]]:
     """Choose the weights of smoothness and sparsity, and the order of view dependence, by trials.
 
     All weights are changed by one factor, as long as held-out rays are predicted better by a coarse
-    fit in the rays' hull; then orders are compared, of which the first is begun with.
+    fit in the rays' hull; then orders are compared, of which the first is begun with. Workers of a
+    Dask scheduler try at the same time what may be asked for next; the choice is the same.
+    InputError: as of `run_units`.
     """
+    coarse, work = replace(settings, levels=LEVELS), partial(held_out_loss, rays, inside)
+    known: dict[_Key, float] = {}
+    with one_client(scheduler) as client:
+        places = len(client.nthreads()) if client else 1
+        while wanted := _ahead(coarse, orders, known, places):
+            progress(f"trial {len(known) + 1}: weights and view dependence by held-out mirrors")
+            losses = run_units(work, wanted, scheduler) if scheduler else map(work, wanted)
+            known.update(zip(map(_key, wanted), losses, strict=True))
     trials: list[Trial] = []
 
     def tried(wanted: Settings) -> Trial:
-        progress(f"trial {len(trials) + 1}: weights and view dependence by held-out mirrors")
-        trials.append(Trial(wanted, held_out_loss(rays, inside, replace(wanted, levels=LEVELS))))
+        trials.append(Trial(wanted, known[_key(wanted)]))
         return trials[-1]
 
+    best = _choice(tried, coarse, orders)
+    return replace(best.settings, levels=settings.levels), trials
+
+
+_Key: TypeAlias = tuple[int, float]
+
+
+def _key(settings: Settings) -> _Key:
+    """All that differs between trials."""
+    return settings.order, settings.sparse
+
+
+class _Unknown(Exception):
+    """A trial that was not made yet."""
+
+
+def _ahead(
+    settings: Settings, orders: tuple[int, ...], known: Mapping[_Key, float], most: int
+) -> list[Settings]:
+    """The trial that the choice needs next, and those that it may need after it: the likely first.
+
+    None where it needs no more.
+    """
+    wanted: dict[_Key, Settings] = {}
+    guesses = deque([dict(known)])
+    while guesses and len(wanted) < most:
+        losses = guesses.popleft()
+
+        def tried(asked: Settings, losses: dict[_Key, float] = losses) -> Trial:
+            if _key(asked) not in losses:
+                raise _Unknown(asked)
+            return Trial(asked, losses[_key(asked)])
+
+        try:
+            _choice(tried, settings, orders)
+        except _Unknown as missing:
+            (asked,) = missing.args
+            wanted.setdefault(_key(asked), asked)
+            least = min(losses.values(), default=1.0)  # it may be worse, or better than all
+            guesses += [losses | {_key(asked): loss} for loss in (2 * least, least / 2)]
+    return [*wanted.values()]
+
+
+def _choice(
+    tried: Callable[[Settings], Trial], settings: Settings, orders: tuple[int, ...]
+) -> Trial:
     best = _best_weight(tried, replace(settings, order=orders[0]))
     for order in orders[1:]:
         other = tried(replace(best.settings, order=order))
         best = other if other.loss < (1 - ORDER_GAIN) * best.loss else best
-    return replace(best.settings, levels=settings.levels), trials
+    return best
 
 
 def _best_weight(tried: Callable[[Settings], Trial], settings: Settings) -> Trial:

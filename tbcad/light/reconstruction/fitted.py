@@ -169,7 +169,7 @@ def _chosen(
     orders = (0, 1) if options.order == "auto" else (settings.order,)
     # Trials are coarse: they do not resolve a pixel.
     single = replace(settings, places=CENTRAL)
-    best, trials = chosen(rays, inside, single, orders, options.detail)
+    best, trials = chosen(rays, inside, single, orders, options.detail, options.scheduler)
     tried = [
         {"order": one.settings.order, "smooth_density": one.settings.smooth_density,
          "loss": one.loss} for one in trials

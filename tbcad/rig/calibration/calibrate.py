@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import diags_array
 
 from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import Plan
@@ -212,12 +211,13 @@ def _compared(
     one, other = (estimate(found.prior, measured.only(part), start=found.values) for part in parts)
     slopes, _ = ray_slopes(found.prior, found.values, *rays)
     # Parameters of single frames are left out: a half sees every other frame.
-    static = diags_array((~found.prior.is_of(Of.FRAME)).astype(np.float64))
-    places = slopes[np.arange(slopes.shape[0]) % FIGURES < PLACES] @ static
-    spreads = [places @ half.covariance for half in (one, other)]
-    own = sum(float(places.multiply(spread).sum()) for spread in spreads)
-    expected = own - 2 * float((spreads[0] * spreads[1]).sum())
-    difference, count = places @ (one.values - other.values), len(rays[0])
+    static = np.flatnonzero(~found.prior.is_of(Of.FRAME))
+    places = slopes[np.arange(slopes.shape[0]) % FIGURES < PLACES][:, static]
+    square = (places.T @ places).toarray()  # of sums of squares over all rays
+    known, of_other = (half.covariance_rows(static) for half in (one, other))
+    own = float((square * (known + of_other)[:, static]).sum())
+    expected = own - 2 * float((square @ known * of_other).sum())
+    difference, count = places @ (one.values - other.values)[static], len(rays[0])
     return HalvesRecord(
         apart=by,
         highlights=(len(one.highlights), len(other.highlights)),

@@ -1,8 +1,10 @@
 """The hull of balls in closed form, and settings that held-out mirrors choose."""
 
 from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from dataclasses import replace
 from math import log
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -80,6 +82,22 @@ def test_a_ball_that_almost_fills_the_capture_sphere_is_not_background() -> None
     assert inside[np.linalg.norm(places, axis=-1) < 0.9 * RADIUS].all()
 
 
+def as_of_a_cluster(patch: pytest.MonkeyPatch, workers: int) -> list[int]:
+    """Numbers of trials that so many workers are given at a time, as they come."""
+    pieces: list[int] = []
+
+    def run_units(
+        work: Callable[[Settings], float], units: list[Settings], _: str
+    ) -> Iterable[float]:
+        pieces.append(len(units))
+        return [work(one) for one in units]
+
+    client = SimpleNamespace(nthreads=lambda: dict.fromkeys(range(workers)))
+    patch.setattr(choice, "one_client", lambda _: nullcontext(client))
+    patch.setattr(choice, "run_units", run_units)
+    return pieces
+
+
 def choose(
     monkeypatch: pytest.MonkeyPatch, best: float, gloss: float, orders: tuple[int, ...] = (0, 1)
 ) -> tuple[Settings, int]:
@@ -94,6 +112,13 @@ def choose(
     told: list[str] = []
     found, trials = chosen(RAYS, HULL, BEGUN, orders, told.append)
     assert len(told) == len(trials)
+    for workers in (1, 3, 20):
+        with monkeypatch.context() as patch:
+            pieces = as_of_a_cluster(patch, workers)
+            assert chosen(RAYS, HULL, BEGUN, orders, told.append, "tcp://a:1") == (found, trials)
+        assert max(pieces) <= workers
+        assert workers > 1 or pieces == [1] * len(trials)
+        assert workers < 20 or len(pieces) == 1 < sum(pieces)
     assert found.levels == BEGUN.levels
     return found, len(trials)
 
@@ -113,6 +138,16 @@ def test_view_dependence_is_chosen_where_it_predicts_better(
     assert choose(monkeypatch, -1, 0.8)[0].order == 1
     assert choose(monkeypatch, -1, 0.8, orders=(0,))[0].order == 0
     assert choose(monkeypatch, -99, 2.0)[1] <= 5  # the walk ends
+
+
+def test_workers_of_a_cluster_choose_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(choice, "LEVELS", TINY.levels)
+    alone = chosen(RAYS, HULL, TINY, (0, 1), str)
+    with distributed.LocalCluster(
+        n_workers=2, processes=False, protocol="tcp", dashboard_address=None
+    ) as cluster:
+        assert chosen(RAYS, HULL, TINY, (0, 1), str, cluster.scheduler_address) == alone
 
 
 def test_held_out_rays_have_no_part_in_the_trial(monkeypatch: pytest.MonkeyPatch) -> None:

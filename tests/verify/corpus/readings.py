@@ -24,7 +24,6 @@ from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light.lamp_light import EdgedBodies
 from tbcad_verify.prototype.light.pinhole_cells import mirror_spheres
 from tbcad_verify.prototype.light.windows import ray_transfer
-from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
 from tbcad_verify.record.prototype import Lamps
@@ -76,7 +75,7 @@ def remembered() -> Iterator[None]:
         ("prototype.stages", "assembly_meshes", _drawn_key),
         ("prototype.stages", "ball_views", _traced_key),
         ("prototype.swing", "axial_solid", _solid_key),
-        ("prototype.swing", "sweep", _sweep_key),
+        ("prototype.swing", "sweep", _given),
         ("prototype.stages", "pixel_rays", _rays_key),
         ("prototype.light.lamp_light", "irradiance", _light_key),
         ("prototype.light.upper_lamps", "irradiance", _light_key),
@@ -163,10 +162,6 @@ def _drawn_key(context: PrototypeContext) -> object:
 
 def _solid_key(measured: MeasuredPrototype, name: str, solid: manifold3d.Manifold) -> object:
     return measured.context.frame, name, solid
-
-
-def _sweep_key(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) -> object:
-    return measured.context.prototype.swing, measured.context.frame, moving, still
 
 
 def _traced_key(measured: MeasuredPrototype, *_: object) -> object:

@@ -311,7 +311,7 @@ def test_no_step_of_the_swing_is_too_large(
     rod = manifold3d.Manifold.cube([0.4, 0.4, 0.4]).translate(at - np.array([0.2, 0.2, 0.2]))
     one, two = (
         swing.sweep(
-            measured,
+            swing.swing_ends(measured),
             swing.axial_solid(measured, "arm", moving),
             swing.axial_solid(measured, "rod", still),
         )
@@ -342,7 +342,7 @@ def test_a_swing_is_that_of_many_angles(measured: MeasuredPrototype, seed: int) 
     place = np.hstack([measured.context.frame[[1, 2, 0]].T, np.zeros((3, 1))])
     solids = [random_body(rng).transform(place) for _ in range(2)]
     one, two = (swing.axial_solid(measured, "body", solid) for solid in solids)
-    found = swing.sweep(measured, one, two)
+    found = swing.sweep(swing.swing_ends(measured), one, two)
     some = np.linspace(*np.radians(measured.context.prototype.swing), 21)
     turns = measured.context.base_rotation(some).as_matrix()
     at = [solids[0].transform(np.hstack([turn, np.zeros((3, 1))])) for turn in turns]

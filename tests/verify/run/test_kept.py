@@ -209,3 +209,11 @@ def test_the_oldest_are_removed(store: Store) -> None:
     store.prune(20_000)
     assert len(list(store.folder.glob("kept-*"))) == 2
     assert (store.folder / "own.txt").exists()
+
+
+def test_solids_count_by_their_facets() -> None:
+    manifold3d = pytest.importorskip("manifold3d")
+    ball = manifold3d.Manifold.sphere(2.0, 12)
+    assert digest([ball]) == digest([manifold3d.Manifold.sphere(2.0, 12)])
+    for other in (ball.translate([0, 0, 1e-9]), ball.refine(2), ball.set_tolerance(0.1)):
+        assert digest([ball]) != digest([other])

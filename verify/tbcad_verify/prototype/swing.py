@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from tbcad_verify.prototype.bodies import MeasuredPrototype, turning
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import PLACED
 from tbcad_verify.report.checks import Check, CheckName, at_most, informative, short_list
+from tbcad_verify.run.kept import kept
 from tbcad_verify.types import Floats
 
 SEARCH_MM = 8.0  # larger clearances are all reported as this
@@ -124,7 +126,9 @@ def checks(
     moving, still = (
         [axial_solid(measured, *one) for one in group] for group in _groups(measured, closed)
     )
-    sweeps = [sweep(measured, one, two) for one in moving for two in still]
+    ends = swing_ends(measured)
+    past = [sweeps_past(one, moving, ends) for one in still]
+    sweeps = [one for of_moving in zip(*past, strict=True) for one in of_moving]
     volume = max((one.volume for one in sweeps), default=0.0)
     nearest = min(sweeps, key=lambda one: one.gap, default=None)
     hits = [
@@ -166,7 +170,21 @@ def _groups(
     return groups[True], groups[False]
 
 
-def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) -> PairSweep:
+def swing_ends(measured: MeasuredPrototype) -> tuple[float, float]:
+    """First and last angle of the base, rad."""
+    first, last = np.radians(measured.context.prototype.swing).tolist()
+    return first, last
+
+
+@kept("checks of the swing")
+def sweeps_past(
+    still: AxialSolid, moving: Sequence[AxialSolid], ends: tuple[float, float]
+) -> list[PairSweep]:
+    """The sweeps of all rotating solids past one that is fixed."""
+    return [sweep(ends, one, still) for one in moving]
+
+
+def sweep(ends: tuple[float, float], moving: AxialSolid, still: AxialSolid) -> PairSweep:
     """Rotate one solid past another that is fixed, each step no larger than their distance allows.
 
     Where both touch is no farther from the axis than either of them reaches, so no point of it
@@ -174,7 +192,7 @@ def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) ->
     their positions along the axis and distances from it keep both apart, no sample is needed: a
     body inside another is so at angle zero too, where all are tested against all.
     """
-    low, high = np.radians(measured.context.prototype.swing).tolist()
+    low, high = ends
     names = (moving.name, still.name)
     bound = moving.distance_at_any_angle(still)
     if bound >= CLEAR_MM:
@@ -182,7 +200,7 @@ def sweep(measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid) ->
     lever = max(min(moving.reach, still.reach), MIN_LEVER_MM)
     at, samples, volume, worst, gap, distance = low, 0, 0.0, low, SEARCH_MM, SEARCH_MM
     while True:
-        distance, shared = _gap_and_volume(*_placed(measured, moving, still, at), distance)
+        distance, shared = _gap_and_volume(*_placed(moving, still, at), distance)
         samples += 1
         if shared > volume or (volume == 0 and distance < gap):
             worst = at
@@ -207,9 +225,7 @@ def _gap_and_volume(one: Any, two: Any, before: float) -> tuple[float, float]:
     return distance, 0.0 if distance > 0 else float((one ^ two).volume())
 
 
-def _placed(
-    measured: MeasuredPrototype, moving: AxialSolid, still: AxialSolid, angle: float
-) -> tuple[Any, Any]:
+def _placed(moving: AxialSolid, still: AxialSolid, angle: float) -> tuple[Any, Any]:
     """Both solids as they lie to each other at a base angle, rad.
 
     The one with fewer facets is rotated: the other's are sorted in space only once.
@@ -217,7 +233,7 @@ def _placed(
     back = moving.solid.num_tri() > still.solid.num_tri()
     turned, other = (still.solid, moving.solid) if back else (moving.solid, still.solid)
     angles = np.array([-angle if back else angle])
-    rotation = measured.context.base_rotation(angles).as_matrix()[0]
+    rotation = Rotation.from_rotvec(angles[:, None] * moving.frame[0]).as_matrix()[0]
     turned = turned.transform(np.hstack([rotation, np.zeros((3, 1))]))
     return (other, turned) if back else (turned, other)
 

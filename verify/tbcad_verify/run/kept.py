@@ -211,6 +211,10 @@ class _Canonical(pickle.Pickler):
             from numpy import array  # here: processes that need none begin without
 
             return kind.__name__, digest([array(value.vertices), array(value.faces)])
+        if (kind.__module__, kind.__name__) == ("manifold3d", "Manifold"):
+            mesh = value.to_mesh64()
+            parts = mesh.vert_properties, mesh.tri_verts, value.get_tolerance()
+            return kind.__name__, digest(parts)
         if names := _worked_out_later(cast("Any", kind)):
             rest = {name: one for name, one in vars(value).items() if name not in names}
             return kind.__module__, kind.__qualname__, digest(rest)

@@ -133,15 +133,18 @@ def _measured(
     box = np.s_[first[1] : at[1] + half + 1, first[0] : at[0] + half + 1]
     numbers = image[box].astype(np.float64)
     light = numbers - (0 if dark is None else dark[box])
-    y, x = np.mgrid[0 : light.shape[0], 0 : light.shape[1]]
-    places = np.stack([x, y], axis=-1) + first
-    centre = np.array([column.mean(), row.mean()])
-    inside, above = np.zeros(x.shape, dtype=bool), np.zeros(x.shape)
+    x, y = (first[k] + np.arange(light.shape[1 - k], dtype=np.float64) for k in (0, 1))
+    places = np.stack(np.broadcast_arrays(x, y[:, None]), axis=-1)
+    centre, zone = np.array([column.mean(), row.mean()]), np.zeros(0)
+    inside, above = np.zeros(0, dtype=bool), np.zeros(0)
     for _ in range(ROUNDS):
-        away = ((places - centre) ** 2).sum(axis=-1)
-        inside = away <= radius**2
-        ring = ~inside & (away <= (radius + RING_PX) ** 2)
-        above = (light - np.median(light[ring], axis=0) if ring.any() else light).sum(axis=-1)
+        away = (x - centre[0]) ** 2 + ((y - centre[1]) ** 2)[:, None]
+        inside, before = away <= radius**2, zone
+        zone = inside.astype(int) + (away <= (radius + RING_PX) ** 2)
+        if np.array_equal(zone, before):  # the same discs have the same centroid
+            break
+        ring = zone == 1
+        above = (light - _median(light[ring]) if ring.any() else light).sum(axis=-1)
         total = float(above[inside].sum())
         if total <= 0:
             return None
@@ -156,6 +159,12 @@ def _measured(
         _colour_noise(light[inside]),
         float(numbers[inside].max()),
     )
+
+
+def _median(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of each colour of pixels (m, 3), to the bit that of numpy, in a quarter of its time."""
+    ordered, count = np.sort(numbers, axis=0), len(numbers)
+    return np.asarray(ordered[(count - 1) // 2 : count // 2 + 1].mean(axis=0))
 
 
 def _colour_noise(light: NDArray[np.float64]) -> float:

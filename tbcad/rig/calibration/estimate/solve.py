@@ -9,7 +9,7 @@ the prior too, and whose exact sparse steps it does not offer.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,7 @@ from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
 from tbcad.rig.calibration.estimate.parameters import Block, Prior, Slopes, covariances
 from tbcad.rig.machine.machine import Highlights, Machine
-from tbcad.types import Bools, Floats, Progress
+from tbcad.types import Bools, Floats, Ints, Progress
 
 MAX_STEPS = 60
 CONVERGED, ROUGHLY = 1e-9, 1e-3  # of the cost, relative; before outliers are left out
@@ -63,7 +63,13 @@ class Estimate:
     @cached_property
     def covariance(self) -> Floats:
         """Of the free parameters in prior standard deviations, (q, q)."""
-        return np.linalg.inv(self.information.toarray())
+        return self.covariance_rows(np.arange(len(self.values)))
+
+    def covariance_rows(self, which: Ints) -> Floats:
+        """The covariance's rows of s free parameters, (s, q)."""
+        columns = np.zeros((len(self.values), len(which)))
+        columns[which, np.arange(len(which))] = 1
+        return np.asarray(_factor(self.information).solve(columns).T)
 
     def sigmas(self) -> dict[Block, Floats]:
         """Standard deviations of all parameters in their units, by block."""
@@ -122,12 +128,16 @@ class _Problem:
     used: Bools
     progress: Progress
     noise: float = 1.0
+    last: dict[bytes, tuple[Floats, csr_array]] = field(default_factory=dict)  # of `at`
 
     def at(self, values: Floats) -> tuple[Floats, csr_array]:
         """Residuals in pixels (n, 2), and the predictions' derivatives (2 n, q)."""
-        h = self.highlights
-        pixel, slopes = highlights_with_slopes(self.prior, values, h.frame, h.sphere, h.led)
-        return h.pixel - pixel, slopes
+        h, key = self.highlights, values.tobytes()
+        if key not in self.last:  # steps, noise and outliers ask for the same
+            self.last.clear()
+            pixel, slopes = highlights_with_slopes(self.prior, values, h.frame, h.sphere, h.led)
+            self.last[key] = h.pixel - pixel, slopes
+        return self.last[key]
 
     def weight(self) -> Floats:
         """Of each highlight's figures, (n,): zero for outliers."""
