@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -41,9 +42,39 @@ def without_fsync() -> Iterator[None]:
         yield
 
 
+# Files that take longest, the longest first: last, one process would wait for another.
+LONGEST = (
+    *("test_documentation.py", "test_any_optics.py", "test_corpus.py", "test_every_design.py"),
+    *("test_tour.py", "test_prototypes.py", "test_edit_loop.py", "test_programs.py"),
+    *("test_arrangement.py", "test_guest.py", "test_loop.py", "test_report_in_chromium.py"),
+)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Designs of many sizes take longest: last, one process would wait for another."""
-    items.sort(key=lambda item: item.get_closest_marker("designs") is None)
+    """Files that take longest come first."""
+    rank = {name: k for k, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
+
+
+Reusing = Callable[[], AbstractContextManager[None]]
+
+
+@pytest.fixture(scope="session")
+def reusing(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Reusing:
+    """Within, builds use what others of this run of tests have worked out, in all processes.
+
+    Only for builds of the code as it is: see above.
+    """
+    place = tmp_path_factory.getbasetemp()
+    folder = (place if worker_id == "master" else place.parent) / "kept"
+
+    @contextmanager
+    def kept() -> Iterator[None]:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("TBCAD_CACHE", str(folder))
+            yield
+
+    return kept
 
 
 @pytest.fixture

@@ -29,10 +29,13 @@ from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
 from tbcad_verify.record.prototype import Lamps
 from tbcad_verify.run.processes import Processes
+from tbcad_verify.shell import lamps
 from tbcad_verify.step import step_file
 from tbcad_verify.step.step_file import StepFile
 from tbcad_verify.types import Floats
 
+# Light of the shell's lamps is followed by a fifth of the bundles, on a quarter of the rows.
+COARSER = {"BUNDLES": 30_000, "ROWS": 16}
 MAX_BYTES = 1 << 26  # of a file that is read to know whether it was read before
 # Of an export, what no result depends on that is kept by the export.
 NOT_DERIVED_FROM = {"folder", "manifest", "digests"}
@@ -87,6 +90,8 @@ def remembered() -> Iterator[None]:
             module = import_module(f"tbcad_verify.{path}")
             once = _Once(getattr(module, name), key)
             stack.enter_context(mock.patch.object(module, name, once))
+        for name, value in COARSER.items():
+            stack.enter_context(mock.patch.object(lamps, name, value))
         each = _EachOnce(step_file.examine_all)
         stack.enter_context(mock.patch.object(step_file, "examine_all", each))
         yield
@@ -187,8 +192,8 @@ def _rays_key(measured: MeasuredPrototype) -> object:
 
 
 def _light_key(
-    lamps: Lamps, points: Floats, normals: Floats, some: Bodies | EdgedBodies, angle: float
+    leds: Lamps, points: Floats, normals: Floats, some: Bodies | EdgedBodies, angle: float
 ) -> object:
     edges, all_of = (some.grazing, some.bodies) if isinstance(some, EdgedBodies) else (None, some)
     bodies = [(one.scene, one.names) for one in (all_of.turning, all_of.still)]
-    return lamps, points, normals, edges, bodies, all_of.context.frame, angle
+    return leds, points, normals, edges, bodies, all_of.context.frame, angle
