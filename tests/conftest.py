@@ -3,7 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,8 @@ from hypothesis import HealthCheck, settings
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Tests replace functions, which no digest of the code tells: nothing is kept between builds.
 os.environ["TBCAD_CACHE"] = ""
+
+from tbcad_verify.run.processes import ProcessEnded, Processes
 
 from tbcad.app.cli import run
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
@@ -75,6 +77,40 @@ def reusing(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Reusing
             yield
 
     return kept
+
+
+@pytest.fixture(scope="session")
+def spare() -> Iterator[list[Any]]:
+    """Processes that have done what they were asked, for `standing`."""
+    processes: list[Any] = []
+    yield processes
+    for process in processes:
+        process.close()
+
+
+@pytest.fixture
+def standing(spare: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes of one build serve the next: they take seconds to load their libraries."""
+    begun, ended = Processes._started, Processes.__exit__
+
+    def started(self: Processes) -> Any:
+        while spare:
+            with suppress(ProcessEnded):
+                process = spare.pop()
+                process.ask((os.chdir, (os.getcwd(),), False, None), None, None)
+                self._all.append(process)
+                return process
+        return begun(self)
+
+    def left(self: Processes, kind: type[BaseException] | None, *rest: object) -> None:
+        self.shutdown(wait=kind is None)
+        if kind is None and not self._killed:
+            spare.extend(self._idle)
+            self._all = [one for one in self._all if one not in self._idle]
+        ended(self, kind, *rest)
+
+    monkeypatch.setattr(Processes, "_started", started)
+    monkeypatch.setattr(Processes, "__exit__", left)
 
 
 @pytest.fixture

@@ -40,6 +40,7 @@ def optics(draw: st.DrawFn) -> list[str]:
     return of_optics([round(x, 1) for x in camera], round(minor, 1), round(diameter, 1))
 
 
+@pytest.mark.usefixtures("standing")
 @given(options=optics())
 @example(
     options=of_optics([61.3, 0, -51.4], 82.6, 35)
@@ -52,7 +53,7 @@ def optics(draw: st.DrawFn) -> list[str]:
 @example(options=of_optics([163.6, 0, -127], 67.9, 24.6))  # a cell whose foot side bends inward
 @example(options=of_optics([216.3, -19.4, -109.2], 64.6, 26.2))  # not symmetrical
 @settings(
-    max_examples=8,
+    max_examples=16,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 def test_any_optics(options: list[str], tmp_path: Path) -> None:

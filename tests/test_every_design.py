@@ -8,7 +8,7 @@ import tbcad
 
 DESIGNS = Path(__file__).parents[1] / "designs"
 
-pytestmark = pytest.mark.designs
+pytestmark = [pytest.mark.designs, pytest.mark.usefixtures("standing")]
 
 
 def test_more_subdivisions(tmp_path: Path) -> None:

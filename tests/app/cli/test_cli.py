@@ -20,6 +20,7 @@ WIDE = ["build", "--n", "4", "--set", "hfov_deg=120", *SENSOR, *SHELL]
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("standing")
 def test_build_verifies_and_verify_agrees(tmp_path: Path, cli: Command) -> None:
     """The camera of the paper does not hold the mirrors of n = 4; a wider one does."""
     out = tmp_path / "exports"
@@ -35,6 +36,7 @@ def test_build_verifies_and_verify_agrees(tmp_path: Path, cli: Command) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("standing")
 def test_failed_verification_keeps_the_files_and_names_mirrors(
     tmp_path: Path, cli: Command
 ) -> None:

@@ -29,6 +29,7 @@ from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
 from tbcad_verify.record.prototype import Lamps
 from tbcad_verify.run.processes import Processes
+from tbcad_verify.run.verify import STAGE_LIMIT_S
 from tbcad_verify.shell import lamps
 from tbcad_verify.step import step_file
 from tbcad_verify.step.step_file import StepFile
@@ -92,7 +93,8 @@ def remembered() -> Iterator[None]:
             stack.enter_context(mock.patch.object(module, name, once))
         for name, value in COARSER.items():
             stack.enter_context(mock.patch.object(lamps, name, value))
-        each = _EachOnce(step_file.examine_all)
+        standing = stack.enter_context(Processes(step_file.PROCESSES, STAGE_LIMIT_S))
+        each = _EachOnce(step_file.examine_all, standing)
         stack.enter_context(mock.patch.object(step_file, "examine_all", each))
         yield
 
@@ -130,15 +132,19 @@ class _Once:
 
 
 class _EachOnce:
-    """The readings of several files by one call, each kept by its bytes; what failed is not."""
+    """The readings of several files by one call, each kept by its bytes; what failed is not.
 
-    def __init__(self, work: Callable[..., list[Any]]) -> None:
-        self._work, self._found = work, dict[object, Any]()
+    `standing`: processes that all verifications use which have no time limit of their own.
+    """
+
+    def __init__(self, work: Callable[..., list[Any]], standing: Processes) -> None:
+        self._work, self._standing, self._found = work, standing, dict[object, Any]()
 
     def __call__(self, blobs: list[FileBytes], processes: Processes) -> list[Any]:
         keys = [(blob.sha256, processes.seconds) for blob in blobs]
         new = [k for k, key in enumerate(keys) if key not in self._found]
-        answers = dict(zip(new, self._work([blobs[k] for k in new], processes), strict=True))
+        own = self._standing if processes.seconds == self._standing.seconds else processes
+        answers = dict(zip(new, self._work([blobs[k] for k in new], own), strict=True))
         self._found |= {
             keys[k]: answer for k, answer in answers.items() if isinstance(answer, StepFile)
         }

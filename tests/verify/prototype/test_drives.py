@@ -20,6 +20,8 @@ from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.purchased.parts import load_parts
 from tests.conftest import Reusing
 
+pytestmark = pytest.mark.usefixtures("standing")
+
 DRIVES = load_drives(load_parts())
 PRINT = "afternoon-print"
 
