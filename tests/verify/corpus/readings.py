@@ -18,7 +18,7 @@ from typing import Any
 from unittest import mock
 
 import manifold3d
-from tbcad_verify.mesh.rays import RayScene
+from tbcad_verify.mesh.rays import ImagePairScene, RayScene
 from tbcad_verify.prototype.bodies import Bodies, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light.ball_views import ray_transfer
@@ -91,6 +91,7 @@ def remembered() -> Iterator[None]:
             module = import_module(f"tbcad_verify.{path}")
             once = _Once(getattr(module, name), key)
             stack.enter_context(mock.patch.object(module, name, once))
+        stack.callback(DIGESTS.clear)
         for name, value in COARSER.items():
             stack.enter_context(mock.patch.object(lamps, name, value))
         standing = stack.enter_context(Processes(step_file.PROCESSES, STAGE_LIMIT_S))
@@ -99,17 +100,41 @@ def remembered() -> Iterator[None]:
         yield
 
 
+def _of_export(export: Export) -> object:
+    names = {field.name for field in fields(export)} - NOT_DERIVED_FROM
+    return [getattr(export, name) for name in sorted(names)]
+
+
+def _of_solid(solid: manifold3d.Manifold) -> object:
+    mesh = solid.to_mesh64()
+    return mesh.vert_properties, mesh.tri_verts
+
+
+# What stands for an object that nothing changes, by its type.
+CONTENT: dict[type, Callable[[Any], object]] = {
+    Export: _of_export,
+    manifold3d.Manifold: _of_solid,
+    RayScene: lambda scene: scene.planes,
+    ImagePairScene: lambda pair: (pair.planes, pair.side),
+    AxialSolid: lambda one: (one.name, one.solid, one.frame),
+}
+# Their digests by identity, beside the objects, whose identity nothing else may get.
+DIGESTS: dict[int, tuple[object, bytes]] = {}
+
+
 class _Pickler(pickle.Pickler):
     def reducer_override(self, one: object) -> Any:
-        if isinstance(one, Export):
-            names = {field.name for field in fields(one)} - NOT_DERIVED_FROM
-            return tuple, ([getattr(one, name) for name in sorted(names)],)
-        if isinstance(one, manifold3d.Manifold):
-            mesh = one.to_mesh64()
-            return tuple, ([mesh.vert_properties, mesh.tri_verts],)
-        if isinstance(one, RayScene):
-            return tuple, ([one.planes],)
-        return NotImplemented
+        if type(one) not in CONTENT:
+            return NotImplemented
+        if id(one) not in DIGESTS:
+            DIGESTS[id(one)] = one, _digest(CONTENT[type(one)](one))
+        return bytes, (DIGESTS[id(one)][1],)
+
+
+def _digest(value: object) -> bytes:
+    stream = io.BytesIO()
+    _Pickler(stream, pickle.HIGHEST_PROTOCOL).dump(value)
+    return hashlib.sha256(stream.getbuffer()).digest()
 
 
 class _Once:
@@ -123,9 +148,7 @@ class _Once:
         value = self._key(*given, **named)
         if value is None:
             return self._work(*given, **named)
-        stream = io.BytesIO()
-        _Pickler(stream, pickle.HIGHEST_PROTOCOL).dump(value)
-        key = hashlib.sha256(stream.getbuffer()).digest()
+        key = _digest(value)
         if key not in self._found:
             self._found[key] = self._work(*given, **named)
         return self._found[key]
