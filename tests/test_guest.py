@@ -50,9 +50,8 @@ assert all(one.passed for one in made)
 """
 
 
-# Both parts, with a carrier in pieces.
 SMALL = (
-    *("n=3", "capture_diameter_mm=35", "prototype.k=2", "printer.bed_mm=[100, 100, 100]"),
+    *("n=3", "capture_diameter_mm=35", "prototype.k=2"),
     *("camera.width_px=416", "camera.height_px=310"),
 )
 

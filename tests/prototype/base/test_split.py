@@ -1,6 +1,7 @@
 """How the base is cut for the bed: planes, holes, what is bought and refused, and the pieces."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ import trimesh
 from manifold3d import Manifold, Mesh64
 from OCP.BRepCheck import BRepCheck_Analyzer
 
+from tbcad.cad.formats.step import write_step
+from tbcad.cad.kernel.brep import Solid
 from tbcad.cad.kernel.checks import plane_faces, volume
 from tbcad.cad.kernel.glyphs import ROWS, SIGNS, fitting_height
 from tbcad.cad.kernel.meshing import mesh_difference
@@ -289,3 +292,13 @@ class TestPieces:
         heads = len(joint.screws) * np.pi * size.access_radius**2 * 25.2  # all, at most
         drilled = sum(part.volume for part in parts)
         assert whole - holes - heads < drilled < whole - holes
+
+    def test_the_same_bytes(self, cut_up: CutUp, tmp_path: Path) -> None:
+        base, _, parts, _ = cut_up
+        rebuilt = carrier_parts(base, split_base(base, PRINTER), PRINTER, MESH_MM)
+        for some, name in ((parts, "one"), (rebuilt, "two")):
+            for part in some:
+                write_step(tmp_path / f"{name}_{part.name}", Solid(part.name, part.shape, ()))
+        for part in parts:
+            one, two = (tmp_path / f"{name}_{part.name}" for name in ("one", "two"))
+            assert one.read_bytes() == two.read_bytes()
