@@ -12,12 +12,11 @@ pytestmark = [pytest.mark.designs, pytest.mark.usefixtures("standing")]
 
 
 def test_more_subdivisions(tmp_path: Path) -> None:
-    """The README's main job builds 18 with all pixels, the tour 6, tests/app/test_edit_loop.py 3.
+    """The README's main job builds 18, the tour 6, tests/app/test_edit_loop.py 3.
 
     Other sizes are laid out in tests/prototype/test_arrangement.py.
     """
-    spec = tbcad.load_spec(None, ["n=24", "camera.width_px=1040", "camera.height_px=776"])
-    built = tbcad.build(spec, tmp_path / "exports")
+    built = tbcad.build(tbcad.load_spec(None, ["n=24"]), tmp_path / "exports")
     assert built.report is not None
     assert built.report.passed, built.report
     assert (built.parts, built.note) == (("shell", "prototype"), "")
