@@ -94,13 +94,17 @@ def standing(spare: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
     begun, ended = Processes._started, Processes.__exit__
 
     def started(self: Processes) -> Any:
-        while spare:
-            with suppress(ProcessEnded):
+        while True:
+            try:
                 process = spare.pop()
+            except IndexError:  # none, or another thread has taken it
+                return begun(self)
+            with suppress(ProcessEnded):
                 process.ask((os.chdir, (os.getcwd(),), False, None), None, None)
                 self._all.append(process)
+                if self._killed:  # meanwhile
+                    process.kill()
                 return process
-        return begun(self)
 
     def left(self: Processes, kind: type[BaseException] | None, *rest: object) -> None:
         self.shutdown(wait=kind is None)
