@@ -17,7 +17,7 @@ MESSAGE = 600  # characters of a line that says why something cannot be made
 # A quarter of the pixels: mirrors of n = 3 are hundreds of them across.
 SENSOR = ("width_px=1040", "height_px=776")
 
-pytestmark = pytest.mark.designs
+pytestmark = [pytest.mark.designs, pytest.mark.usefixtures("standing")]
 
 
 def of_optics(camera: list[float], semi_minor: float, diameter: float) -> list[str]:
@@ -40,7 +40,6 @@ def optics(draw: st.DrawFn) -> list[str]:
     return of_optics([round(x, 1) for x in camera], round(minor, 1), round(diameter, 1))
 
 
-@pytest.mark.usefixtures("standing")
 @given(options=optics())
 @example(
     options=of_optics([61.3, 0, -51.4], 82.6, 35)
