@@ -39,7 +39,8 @@ def state():
 
 
 def build(k):
-    return tbcad.build(tbcad.load_spec(None, sys.argv[4:]), place / str(k), parts=parts)
+    spec = tbcad.load_spec(None, ["n=6" if "prototype" in parts else "n=2"])
+    return tbcad.build(spec, place / str(k), parts=parts)
 
 
 before = state()
@@ -49,11 +50,6 @@ assert state() == before, (state(), before)
 assert all(one.passed for one in made)
 """
 
-
-SMALL = (
-    *("n=3", "capture_diameter_mm=35", "prototype.k=2"),
-    *("camera.width_px=416", "camera.height_px=310"),
-)
 
 # As on a system that is no POSIX; found by Python in this process and all that it starts.
 HIDDEN = """
@@ -83,8 +79,7 @@ def run_python(
     script.write_text(SCRIPT, encoding="utf-8")
     folder.mkdir()
     (folder / "sitecustomize.py").write_text(HIDDEN if hidden else "", encoding="utf-8")
-    words = (str(place), parts, str(builds), *(SMALL if builds > 1 else ["n=2"]))
-    command = [sys.executable, *(code or [script]), *words]
+    command = [sys.executable, *(code or [script]), str(place), parts, str(builds)]
     environment = {**os.environ, "PYTHONPATH": str(folder)}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert (done.returncode, done.stderr, done.stdout) == (0, "", "")
@@ -118,7 +113,6 @@ def test_two_builds_at_once_write_what_a_command_writes(tmp_path: Path) -> None:
     written = digests(tmp_path / "0")
     assert digests(tmp_path / "1") == written
     main = "import sys; from tbcad.app.cli import main; sys.exit(main())"
-    words = ["--parts", "shell,prototype", *(word for key in SMALL for word in ("--set", key))]
-    command = [sys.executable, "-c", main, "build", *words]
+    command = [sys.executable, "-c", main, "build", "--n", "6", "--parts", "shell,prototype"]
     subprocess.run([*command, "--out", str(tmp_path / "command"), "--quiet"], check=True)
     assert digests(tmp_path / "command") == written
