@@ -3,7 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -56,27 +56,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files that take longest come first."""
     rank = {name: k for k, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
-
-
-Reusing = Callable[[], AbstractContextManager[None]]
-
-
-@pytest.fixture(scope="session")
-def reusing(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Reusing:
-    """Within, builds use what others of this run of tests have worked out, in all processes.
-
-    Only for builds of the code as it is: see above.
-    """
-    place = tmp_path_factory.getbasetemp()
-    folder = (place if worker_id == "master" else place.parent) / "kept"
-
-    @contextmanager
-    def kept() -> Iterator[None]:
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setenv("TBCAD_CACHE", str(folder))
-            yield
-
-    return kept
 
 
 @pytest.fixture(scope="session")

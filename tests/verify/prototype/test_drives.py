@@ -18,9 +18,6 @@ from tbcad_verify.prototype.drive_checks import EFFICIENCY, FULL_STEPS, MOTORS, 
 from tbcad.app.cli import run
 from tbcad.prototype.drive.drive import Drive, load_drives
 from tbcad.prototype.purchased.parts import load_parts
-from tests.conftest import Reusing
-
-pytestmark = pytest.mark.usefixtures("standing")
 
 DRIVES = load_drives(load_parts())
 PRINT = "afternoon-print"
@@ -119,19 +116,17 @@ def test_both_sides_of_a_belt_pull_at_the_shaft() -> None:
 
 
 @pytest.mark.designs
+@pytest.mark.usefixtures("standing")
 @pytest.mark.parametrize(
     ("drive", "lock"), [("nema17-direct", "clamp"), ("stage-60", "set-screws")]
 )
-def test_a_build_with_another_drive_is_verified(
-    drive: str, lock: str, tmp_path: Path, reusing: Reusing
-) -> None:
+def test_a_build_with_another_drive_is_verified(drive: str, lock: str, tmp_path: Path) -> None:
     """Seats of this design end behind the disc that a hub on a stage would have."""
     folder = tmp_path / "export"
     keys = (f"prototype.base.drive={drive}", f"prototype.base.lock={lock}")
     options = [word for key in keys for word in ("--set", key)]
     words = ["build", PRINT, "--parts", "prototype", "--no-verify", *options, "--out", str(folder)]
-    with reusing():
-        assert run(words) == 0
+    assert run(words) == 0
     report = verify(folder)
     assert report.passed, report.verdict
     assert report.balls
