@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from hypothesis import HealthCheck, settings
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Tests replace functions, which no digest of the code tells: nothing is kept between builds.
 os.environ["TBCAD_CACHE"] = ""
+
+from tbcad_verify.run.processes import ProcessEnded, Processes
 
 from tbcad.app.cli import run
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
@@ -41,9 +44,56 @@ def without_fsync() -> Iterator[None]:
         yield
 
 
+# Files that take longest, the longest first: last, one process would wait for another.
+LONGEST = (
+    *("test_documentation.py", "test_any_optics.py", "test_corpus.py", "test_every_design.py"),
+    *("test_tour.py", "test_prototypes.py", "test_edit_loop.py", "test_programs.py"),
+    *("test_arrangement.py", "test_guest.py", "test_loop.py", "test_report_in_chromium.py"),
+)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Designs of many sizes take longest: last, one process would wait for another."""
-    items.sort(key=lambda item: item.get_closest_marker("designs") is None)
+    """Files that take longest come first."""
+    rank = {name: k for k, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
+
+
+@pytest.fixture(scope="session")
+def spare() -> Iterator[list[Any]]:
+    """Processes that have done what they were asked, for `standing`."""
+    processes: list[Any] = []
+    yield processes
+    for process in processes:
+        process.close()
+
+
+@pytest.fixture
+def standing(spare: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes of one build serve the next: they take seconds to load their libraries."""
+    begun, ended = Processes._started, Processes.__exit__
+
+    def started(self: Processes) -> Any:
+        while True:
+            try:
+                process = spare.pop()
+            except IndexError:  # none, or another thread has taken it
+                return begun(self)
+            with suppress(ProcessEnded):
+                process.ask((os.chdir, (os.getcwd(),), False, None), None, None)
+                self._all.append(process)
+                if self._killed:  # meanwhile
+                    process.kill()
+                return process
+
+    def left(self: Processes, kind: type[BaseException] | None, *rest: object) -> None:
+        self.shutdown(wait=kind is None)
+        if kind is None and not self._killed:
+            spare.extend(self._idle)
+            self._all = [one for one in self._all if one not in self._idle]
+        ended(self, kind, *rest)
+
+    monkeypatch.setattr(Processes, "_started", started)
+    monkeypatch.setattr(Processes, "__exit__", left)
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ MESSAGE = 600  # characters of a line that says why something cannot be made
 # A quarter of the pixels: mirrors of n = 3 are hundreds of them across.
 SENSOR = ("width_px=1040", "height_px=776")
 
-pytestmark = pytest.mark.designs
+pytestmark = [pytest.mark.designs, pytest.mark.usefixtures("standing")]
 
 
 def of_optics(camera: list[float], semi_minor: float, diameter: float) -> list[str]:

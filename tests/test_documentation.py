@@ -227,7 +227,7 @@ def expected_code(shown: Command) -> int:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("quick")
+@pytest.mark.usefixtures("quick", "standing")
 @pytest.mark.parametrize(
     "document", sorted({one.document for one in EVERY if one.whole} - {*OF_THEIR_OWN})
 )

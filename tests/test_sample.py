@@ -13,6 +13,8 @@ from tbcad.core.mirrors.record import COLUMNS, design_record, mirror_rows
 from tbcad.core.spec.load import load_spec
 from tests.exported_files import read_csv
 
+pytestmark = pytest.mark.usefixtures("standing")
+
 ROOT = Path(__file__).parents[1]
 SAMPLE = ROOT / "docs" / "sample"
 

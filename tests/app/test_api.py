@@ -70,6 +70,7 @@ def test_short_reprs() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("standing")
 def test_example_of_the_readme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     example = re.search(r"<!-- test: example -->\n```python\n(.*?)```", text, re.DOTALL)

@@ -35,6 +35,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {one.name: one.read_bytes() for one in sorted(folder.iterdir())}
 
 
+@pytest.mark.usefixtures("standing")
 def test_what_is_built_again_is_the_same(kept_in: Path, tmp_path: Path) -> None:
     def built(fresh: bool = False) -> tuple[dict[str, bytes], list[str]]:
         said: list[str] = []
@@ -104,6 +105,7 @@ def test_two_builds_at_once_and_one_after_them_give_the_bytes_of_a_fresh_one(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("standing")
 def test_twenty_edits_give_the_bytes_of_fresh_builds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

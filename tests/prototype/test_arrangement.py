@@ -66,9 +66,9 @@ class TestChoice:
         assert chosen.layout.fit.coverage.min() >= 60 - 1e-6
 
     @pytest.mark.designs
-    @pytest.mark.parametrize("n", [4, 6, *range(9, 31), 33, 40])
+    @pytest.mark.parametrize("n", [4, 9, 11, 14, 16, 20, 23, 26, 30])
     def test_many_subdivisions(self, n: int) -> None:
-        """Above 30 an arrangement takes up to two minutes to find; 36 is built and verified."""
+        """Above 30 an arrangement takes up to two minutes to find."""
         self.test_few_mirrors(n)
 
 

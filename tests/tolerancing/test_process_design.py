@@ -30,6 +30,8 @@ from tbcad.tolerancing.process_design import (
     ssim_text,
 )
 
+pytestmark = pytest.mark.usefixtures("standing")
+
 SMALL = ["n=4", "mirrors.margin_mm=0"]
 BUILDS = 60
 WANTED = 0.9

@@ -15,7 +15,6 @@ from tbcad.output.build import write_export
 from tbcad.output.parts import PARTS, PROTOTYPE, parse_parts
 from tbcad.prototype.assembly_steps.machine import read_machine
 from tbcad.prototype.assembly_steps.steps import assembly_steps
-from tests.exported_files import contents
 
 pytestmark = pytest.mark.slow
 OPTIONS = ["n=6", "prototype.k=4", "prototype.frame.clearance_mm=1.5", "structure_error_mm=0.1"]
@@ -72,11 +71,6 @@ def test_lengths_of_the_gauge_are_those_of_its_marks(folder: Path, record: dict[
     assert widths == pytest.approx([lengths["near_width"], lengths["far_width"]])
     assert lengths["hub_to_far"] - lengths["hub_to_near"] == pytest.approx(far - near)
     assert lengths["hub_to_pinhole"] - lengths["hub_to_near"] == pytest.approx(pinhole - near)
-
-
-def test_the_same_bytes_again(folder: Path, tmp_path: Path) -> None:
-    write_export(design(load_spec(None, OPTIONS)), tmp_path, [PROTOTYPE])
-    assert contents(tmp_path) == contents(folder)
 
 
 def test_parts_by_name() -> None:

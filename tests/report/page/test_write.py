@@ -22,6 +22,8 @@ from tbcad.report.page.bodies import KINDS, PackedArrays
 from tbcad.report.page.write import MAX_BYTES, page, write_report
 from tests.exported_files import read_csv
 
+pytestmark = pytest.mark.usefixtures("standing")
+
 SAMPLE = Path(__file__).parents[3] / "docs" / "sample"
 HOSTILE = '<script>alert("1")</script>&.png'
 

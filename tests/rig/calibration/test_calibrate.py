@@ -62,7 +62,6 @@ from tests.rig.calibration.conftest import ERRORS, FAULT
 from tests.rig.calibration.machines import drawn, every_highlight
 
 AXES = ("x", "y", "z")
-MACHINES = 24
 
 
 @pytest.fixture(scope="module")

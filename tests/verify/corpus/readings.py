@@ -18,7 +18,7 @@ from typing import Any
 from unittest import mock
 
 import manifold3d
-from tbcad_verify.mesh.rays import RayScene
+from tbcad_verify.mesh.rays import ImagePairScene, RayScene
 from tbcad_verify.prototype.bodies import Bodies, MeasuredPrototype
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light.lamp_light import EdgedBodies
@@ -28,10 +28,14 @@ from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
 from tbcad_verify.record.prototype import Lamps
 from tbcad_verify.run.processes import Processes
+from tbcad_verify.run.verify import STAGE_LIMIT_S
+from tbcad_verify.shell import lamps
 from tbcad_verify.step import step_file
 from tbcad_verify.step.step_file import StepFile
 from tbcad_verify.types import Floats
 
+# Light of the shell's lamps is followed by a fifth of the bundles, on a quarter of the rows.
+COARSER = {"BUNDLES": 30_000, "ROWS": 16}
 MAX_BYTES = 1 << 26  # of a file that is read to know whether it was read before
 # Of an export, what no result depends on that is kept by the export.
 NOT_DERIVED_FROM = {"folder", "manifest", "digests"}
@@ -86,22 +90,50 @@ def remembered() -> Iterator[None]:
             module = import_module(f"tbcad_verify.{path}")
             once = _Once(getattr(module, name), key)
             stack.enter_context(mock.patch.object(module, name, once))
-        each = _EachOnce(step_file.examine_all)
+        stack.callback(DIGESTS.clear)
+        for name, value in COARSER.items():
+            stack.enter_context(mock.patch.object(lamps, name, value))
+        standing = stack.enter_context(Processes(step_file.PROCESSES, STAGE_LIMIT_S))
+        each = _EachOnce(step_file.examine_all, standing)
         stack.enter_context(mock.patch.object(step_file, "examine_all", each))
         yield
 
 
+def _of_export(export: Export) -> object:
+    names = {field.name for field in fields(export)} - NOT_DERIVED_FROM
+    return [getattr(export, name) for name in sorted(names)]
+
+
+def _of_solid(solid: manifold3d.Manifold) -> object:
+    mesh = solid.to_mesh64()
+    return mesh.vert_properties, mesh.tri_verts
+
+
+# What stands for an object that nothing changes, by its type.
+CONTENT: dict[type, Callable[[Any], object]] = {
+    Export: _of_export,
+    manifold3d.Manifold: _of_solid,
+    RayScene: lambda scene: scene.planes,
+    ImagePairScene: lambda pair: (pair.planes, pair.side),
+    AxialSolid: lambda one: (one.name, one.solid, one.frame),
+}
+# Their digests by identity, beside the objects, whose identity nothing else may get.
+DIGESTS: dict[int, tuple[object, bytes]] = {}
+
+
 class _Pickler(pickle.Pickler):
     def reducer_override(self, one: object) -> Any:
-        if isinstance(one, Export):
-            names = {field.name for field in fields(one)} - NOT_DERIVED_FROM
-            return tuple, ([getattr(one, name) for name in sorted(names)],)
-        if isinstance(one, manifold3d.Manifold):
-            mesh = one.to_mesh64()
-            return tuple, ([mesh.vert_properties, mesh.tri_verts],)
-        if isinstance(one, RayScene):
-            return tuple, ([one.planes],)
-        return NotImplemented
+        if type(one) not in CONTENT:
+            return NotImplemented
+        if id(one) not in DIGESTS:
+            DIGESTS[id(one)] = one, _digest(CONTENT[type(one)](one))
+        return bytes, (DIGESTS[id(one)][1],)
+
+
+def _digest(value: object) -> bytes:
+    stream = io.BytesIO()
+    _Pickler(stream, pickle.HIGHEST_PROTOCOL).dump(value)
+    return hashlib.sha256(stream.getbuffer()).digest()
 
 
 class _Once:
@@ -115,24 +147,26 @@ class _Once:
         value = self._key(*given, **named)
         if value is None:
             return self._work(*given, **named)
-        stream = io.BytesIO()
-        _Pickler(stream, pickle.HIGHEST_PROTOCOL).dump(value)
-        key = hashlib.sha256(stream.getbuffer()).digest()
+        key = _digest(value)
         if key not in self._found:
             self._found[key] = self._work(*given, **named)
         return self._found[key]
 
 
 class _EachOnce:
-    """The readings of several files by one call, each kept by its bytes; what failed is not."""
+    """The readings of several files by one call, each kept by its bytes; what failed is not.
 
-    def __init__(self, work: Callable[..., list[Any]]) -> None:
-        self._work, self._found = work, dict[object, Any]()
+    `standing`: processes that all verifications use which have no time limit of their own.
+    """
+
+    def __init__(self, work: Callable[..., list[Any]], standing: Processes) -> None:
+        self._work, self._standing, self._found = work, standing, dict[object, Any]()
 
     def __call__(self, blobs: list[FileBytes], processes: Processes) -> list[Any]:
         keys = [(blob.sha256, processes.seconds) for blob in blobs]
         new = [k for k, key in enumerate(keys) if key not in self._found]
-        answers = dict(zip(new, self._work([blobs[k] for k in new], processes), strict=True))
+        own = self._standing if processes.seconds == self._standing.seconds else processes
+        answers = dict(zip(new, self._work([blobs[k] for k in new], own), strict=True))
         self._found |= {
             keys[k]: answer for k, answer in answers.items() if isinstance(answer, StepFile)
         }
@@ -183,8 +217,8 @@ def _rays_key(measured: MeasuredPrototype) -> object:
 
 
 def _light_key(
-    lamps: Lamps, points: Floats, normals: Floats, some: Bodies | EdgedBodies, angle: float
+    leds: Lamps, points: Floats, normals: Floats, some: Bodies | EdgedBodies, angle: float
 ) -> object:
     edges, all_of = (some.grazing, some.bodies) if isinstance(some, EdgedBodies) else (None, some)
     bodies = [(one.scene, one.names) for one in (all_of.turning, all_of.still)]
-    return lamps, points, normals, edges, bodies, all_of.context.frame, angle
+    return leds, points, normals, edges, bodies, all_of.context.frame, angle

@@ -116,6 +116,7 @@ def test_both_sides_of_a_belt_pull_at_the_shaft() -> None:
 
 
 @pytest.mark.designs
+@pytest.mark.usefixtures("standing")
 @pytest.mark.parametrize(
     ("drive", "lock"), [("nema17-direct", "clamp"), ("stage-60", "set-screws")]
 )

@@ -27,6 +27,8 @@ from tests.verify.prototype.synthetic_prototype import (
 )
 from tests.verify.synthetic_export import sign
 
+pytestmark = pytest.mark.usefixtures("standing")
+
 Row = dict[str, Any]
 
 # Checks that are unknown where a ball's stop is, and where its place is.

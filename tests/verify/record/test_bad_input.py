@@ -20,6 +20,8 @@ from tests.verify.corpus.broken_records import JSON, MANIFEST, RECORDS, TABLE
 from tests.verify.corpus.mutation import Mutation, as_bytes, at, refusing
 from tests.verify.optical_setups import IN_PROCESS
 
+pytestmark = pytest.mark.usefixtures("standing")
+
 BIG = {"width_px": 65536, "height_px": 65536}
 LONG_NUMBER = b'"target_mm": ' + b"9" * 5000
 

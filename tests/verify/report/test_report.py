@@ -29,6 +29,8 @@ from tests.verify.corpus.mutation import attempt
 from tests.verify.optical_setups import IN_PROCESS
 from tests.verify.synthetic_export import Cells, Design, export, sign
 
+pytestmark = pytest.mark.usefixtures("standing")
+
 MIRROR_KEYS = [
     *("id", "coverage_facet_mm", "coverage_fitted_mm"),
     *("centre_error_mm", "radius_error_mm", "pixels"),

@@ -28,6 +28,8 @@ from tbcad_verify.report.text import MAX_LINES, WIDTH, table
 
 from tests.verify.synthetic_export import Design, export
 
+pytestmark = pytest.mark.usefixtures("standing")
+
 LONG = ", ".join(f"a{k:04d} sees {k / 7:.2f} mm" for k in range(40))
 SUMMARY_KEYS = [
     *("schema", "verdict", "target_mm", "figures", "failed", "changed", "as_made", "note"),

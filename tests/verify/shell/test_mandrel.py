@@ -37,6 +37,7 @@ from tests.verify.optical_setups import IN_PROCESS, optical_setup_of
 SETTINGS = ["n=4", "shell.negative=true", "width_px=200", "height_px=150"]
 STL, STEP = "mandrel_a.stl", "mandrel_a.step"
 # Meshes and good STEP files of both edges are read in other tests; these take long for each.
+pytestmark = pytest.mark.usefixtures("standing")
 ON_VALLEYS = pytest.mark.parametrize(
     "edges", ["valley", pytest.param("pedestal", marks=pytest.mark.slow)], indirect=True
 )

@@ -22,6 +22,8 @@ from tbcad_verify.types import Floats
 from tbcad.output.build import write_export
 from tests.pedestal_designs import pedestal_design
 
+pytestmark = pytest.mark.usefixtures("standing")
+
 COARSE = "mesh.structure_error_mm=0.5"
 SETTINGS = [
     ["n=12", "coating_um=100"],  # some borders are shorter than the groove
