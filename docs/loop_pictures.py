@@ -1,0 +1,123 @@
+"""Write docs/pictures/loop-*.png: photographs of a run, their merge, and views of three merges.
+
+tbcad simulate-run exports/ --process fdm --seed 3 --out runs/fdm3
+tbcad calibrate runs/fdm3 --exports exports/ --out calibration/
+python docs/loop_pictures.py exports/ runs/fdm3 calibration/
+
+SSIM is printed too: docs/from-photographs-to-views.md has it.
+"""
+
+import csv
+import sys
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from PIL import Image
+
+import tbcad
+from tbcad.common.figure_files import srgb
+from tbcad.light.simulate.capture.files import captured_scene
+from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.scene.reflector import read_export
+from tbcad.light.simulate.views.viewpoints import BY_NEAREST, Viewpoints, pinhole_targets
+from tbcad.rig.machine.designed import designed_prototype
+from tbcad.rig.machine.machine import RECORD, read_machine, write_machine
+from tbcad.types import Bytes
+
+PICTURES = Path(__file__).parent / "pictures"
+PHOTOGRAPH = "a_0040"
+PART = np.s_[:1240, 540:1540]  # rows and columns that show balls
+BAR_PX, MOST = 200, 100  # length of the bar; levels at the end of the scale
+SIZE, CUT = (400, 300), np.s_[50:250, 75:325]
+VIEWPOINTS = Viewpoints(np.repeat((25.0, 60.0), 3), np.tile((20.0, 140.0, 250.0), 2), 640.0)
+
+
+def encoded(picture: Bytes) -> Bytes:
+    """Linear numbers (h, w, ...) as a display wants them (sRGB)."""
+    return np.asarray(np.rint(255 * srgb(picture / 255.0)), dtype=np.uint8)
+
+
+def bar(axes: Axes) -> None:
+    """A bar of BAR_PX pixels at the lower left."""
+    low, left = axes.get_ylim()[0] - 40, axes.get_xlim()[0] + 40
+    axes.plot([left, left + BAR_PX], [low, low], color="white", linewidth=3)
+    axes.text(left, low - 15, f"{BAR_PX} px", color="white", fontsize=9)
+
+
+def photographs(run: Path, calibration: Path) -> None:
+    """One stop lit, and by LED 1 with rings about the highlights that the calibration used."""
+    with (calibration / "residuals.csv").open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["photograph"] == f"{PHOTOGRAPH}_led_1"]
+    figure, both = plt.subplots(1, 2, figsize=(9, 5.9), layout="constrained")
+    for axes, phase, title in zip(both, ("lit", "led_1"), ("lit", "by LED 1"), strict=True):
+        picture = np.asarray(Image.open(run / "photographs" / f"{PHOTOGRAPH}_{phase}.png"))
+        axes.imshow(encoded(picture)[PART])
+        axes.set_title(title, fontsize=11)
+        axes.set_axis_off()
+        bar(axes)
+    for row in rows:
+        at = float(row["column_px"]) - PART[1].start, float(row["row_px"])
+        colour = "#E69F00" if row["used"] == "1" else "#999999"
+        both[1].plot(*at, "o", markersize=14, fillstyle="none", color=colour)
+        text = f"ball {row['ball']}" + ("" if row["used"] == "1" else ", left out")
+        both[1].text(at[0] + 30, at[1] + 10, text, color=colour, fontsize=9)
+    figure.savefig(PICTURES / "loop-photographs.png", dpi=110)
+
+
+def merged(folder: Path) -> None:
+    """The merged picture of camera a."""
+    picture = Image.fromarray(encoded(np.asarray(Image.open(folder / "camera_a.png"))))
+    small = picture.resize((picture.width // 2, picture.height // 2), Image.Resampling.BOX)
+    small.save(PICTURES / "loop-merged.png", optimize=True)
+
+
+def views(perfect: Path, merges: dict[str, Path], capture_mm: float) -> None:
+    """Views of the first place, their differences from the truth, and SSIM of all places."""
+    scene = captured_scene(perfect)
+    assert scene is not None
+    targets = pinhole_targets(scene, VIEWPOINTS.cameras(capture_mm, SIZE))
+    figure, axes = plt.subplots(2, 4, figsize=(12, 5.4), layout="constrained")
+    truth = targets.truths[0]
+    axes[0, 0].imshow(encoded(truth)[CUT])
+    axes[0, 0].set_title("ground truth", fontsize=11)
+    for column, (name, folder) in enumerate(merges.items(), 1):
+        view = BY_NEAREST.views(tbcad.LightField.read(folder))
+        ssim = targets.quality(view, lambda _: None)["ssim"].mean()
+        print(f"{name}: SSIM {ssim:.3f}", flush=True)
+        picture = view(targets.cameras[0])
+        axes[0, column].imshow(encoded(picture)[CUT])
+        axes[0, column].set_title(f"{name}\nSSIM of six views {ssim:.3f}", fontsize=11)
+        apart = np.abs(picture.astype(float) - truth).mean(axis=2)[CUT]
+        image = axes[1, column].imshow(apart, vmin=0, vmax=MOST)
+        axes[1, column].set_title("difference from the truth", fontsize=10)
+    for one in axes.flat:
+        one.set_axis_off()
+    figure.colorbar(image, ax=axes[1].tolist(), label="levels of 255", extend="max")
+    figure.savefig(PICTURES / "loop-views.png", dpi=110)
+
+
+def main(build: Path, run: Path, calibration: Path) -> None:
+    """Write the three pictures."""
+    photographs(run, calibration)
+    with tempfile.TemporaryDirectory() as temp:
+        folders = {name: Path(temp) / name for name in ("perfect", "calibrated", "drawing", "by")}
+        export = read_export(build)
+        designed = designed_prototype(export, read_plan(export))
+        folders["by"].mkdir()
+        write_machine(folders["by"] / RECORD, designed, read_machine(calibration / RECORD)[1])
+        tbcad.capture(build, geometry="prototype", out=folders["perfect"])
+        tbcad.merge(run, calibration, build, out=folders["calibrated"])
+        tbcad.merge(run, folders["by"], build, out=folders["drawing"])
+        merged(folders["calibrated"])
+        names = ("perfect machine", "as calibrated", "by the drawing")
+        merges = dict(zip(names, folders.values(), strict=False))
+        views(folders["perfect"], merges, export.capture_mm)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 4:
+        sys.exit("usage: python docs/loop_pictures.py BUILD RUN CALIBRATION")
+    main(*map(Path, sys.argv[1:]))
