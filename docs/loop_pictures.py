@@ -19,19 +19,23 @@ from PIL import Image
 
 import tbcad
 from tbcad.common.figure_files import srgb
-from tbcad.light.simulate.capture.files import captured_scene
+from tbcad.light.simulate.camera_photographs import photographed
+from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.prototype.run import read_plan
+from tbcad.light.simulate.scene.lamps import lit_by, read_lamps
+from tbcad.light.simulate.scene.ray_casting import Scene, prepared_scene
 from tbcad.light.simulate.scene.reflector import read_export
 from tbcad.light.simulate.views.viewpoints import BY_NEAREST, Viewpoints, pinhole_targets
 from tbcad.rig.machine.designed import designed_prototype
 from tbcad.rig.machine.machine import RECORD, read_machine, write_machine
+from tbcad.rig.simulated_run.simulate import run_object
 from tbcad.types import Bytes
 
 PICTURES = Path(__file__).parent / "pictures"
 PHOTOGRAPH = "a_0040"
 PART = np.s_[:1240, 540:1540]  # rows and columns that show balls
 BAR_PX, MOST = 200, 100  # length of the bar; levels at the end of the scale
-SIZE, CUT = (400, 300), np.s_[50:250, 75:325]
+SIZE, CUT = (400, 300), np.s_[60:240, 90:310]
 VIEWPOINTS = Viewpoints(np.repeat((25.0, 60.0), 3), np.tile((20.0, 140.0, 250.0), 2), 640.0)
 
 
@@ -74,23 +78,21 @@ def merged(folder: Path) -> None:
     small.save(PICTURES / "loop-merged.png", optimize=True)
 
 
-def views(perfect: Path, merges: dict[str, Path], capture_mm: float) -> None:
+def views(scene: Scene, sources: dict[str, LightField]) -> None:
     """Views of the first place, their differences from the truth, and SSIM of all places."""
-    scene = captured_scene(perfect)
-    assert scene is not None
+    capture_mm = next(iter(sources.values())).capture_mm
     targets = pinhole_targets(scene, VIEWPOINTS.cameras(capture_mm, SIZE))
     figure, axes = plt.subplots(2, 4, figsize=(12, 5.4), layout="constrained")
-    truth = targets.truths[0]
-    axes[0, 0].imshow(encoded(truth)[CUT])
+    axes[0, 0].imshow(encoded(targets.truths[0])[CUT])
     axes[0, 0].set_title("ground truth", fontsize=11)
-    for column, (name, folder) in enumerate(merges.items(), 1):
-        view = BY_NEAREST.views(tbcad.LightField.read(folder))
+    for column, (name, source) in enumerate(sources.items(), 1):
+        view = BY_NEAREST.views(source)
         ssim = targets.quality(view, lambda _: None)["ssim"].mean()
         print(f"{name}: SSIM {ssim:.3f}", flush=True)
         picture = view(targets.cameras[0])
         axes[0, column].imshow(encoded(picture)[CUT])
         axes[0, column].set_title(f"{name}\nSSIM of six views {ssim:.3f}", fontsize=11)
-        apart = np.abs(picture.astype(float) - truth).mean(axis=2)[CUT]
+        apart = np.abs(picture.astype(float) - targets.truths[0]).mean(axis=2)[CUT]
         image = axes[1, column].imshow(apart, vmin=0, vmax=MOST)
         axes[1, column].set_title("difference from the truth", fontsize=10)
     for one in axes.flat:
@@ -102,19 +104,20 @@ def views(perfect: Path, merges: dict[str, Path], capture_mm: float) -> None:
 def main(build: Path, run: Path, calibration: Path) -> None:
     """Write the three pictures."""
     photographs(run, calibration)
+    export, frames = read_export(build), read_machine(calibration / RECORD)[1]
+    lamps, subject = read_lamps(build), run_object(read_export(build), None)
+    scene = prepared_scene(lit_by(lamps, subject) if lamps else subject)
+    perfect = photographed(export, scene, "prototype", 1, lambda _: None)
     with tempfile.TemporaryDirectory() as temp:
-        folders = {name: Path(temp) / name for name in ("perfect", "calibrated", "drawing", "by")}
-        export = read_export(build)
-        designed = designed_prototype(export, read_plan(export))
-        folders["by"].mkdir()
-        write_machine(folders["by"] / RECORD, designed, read_machine(calibration / RECORD)[1])
-        tbcad.capture(build, geometry="prototype", out=folders["perfect"])
-        tbcad.merge(run, calibration, build, out=folders["calibrated"])
-        tbcad.merge(run, folders["by"], build, out=folders["drawing"])
-        merged(folders["calibrated"])
+        drawing, calibrated, drawn = (Path(temp) / name for name in ("drawing", "a", "b"))
+        drawing.mkdir()
+        write_machine(drawing / RECORD, designed_prototype(export, read_plan(export)), frames)
+        tbcad.merge(run, calibration, build, out=calibrated)
+        tbcad.merge(run, drawing, build, out=drawn)
+        merged(calibrated)
+        read = (LightField.read(calibrated), LightField.read(drawn))
         names = ("perfect machine", "as calibrated", "by the drawing")
-        merges = dict(zip(names, folders.values(), strict=False))
-        views(folders["perfect"], merges, export.capture_mm)
+        views(scene, dict(zip(names, (perfect, *read), strict=True)))
 
 
 if __name__ == "__main__":
