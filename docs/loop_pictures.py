@@ -14,8 +14,8 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 from PIL import Image
+from scipy.ndimage import maximum_filter
 
 import tbcad
 from tbcad.common.figure_files import srgb
@@ -33,7 +33,7 @@ from tbcad.types import Bytes
 
 PICTURES = Path(__file__).parent / "pictures"
 PHOTOGRAPH = "a_0040"
-PART = np.s_[:1240, 540:1540]  # rows and columns that show balls
+PART = np.s_[:1040, 60:1300]  # rows and columns that show balls
 BAR_PX, MOST = 200, 100  # length of the bar; levels at the end of the scale
 SIZE, CUT = (400, 300), np.s_[60:240, 90:310]
 VIEWPOINTS = Viewpoints(np.repeat((25.0, 60.0), 3), np.tile((20.0, 140.0, 250.0), 2), 640.0)
@@ -44,30 +44,23 @@ def encoded(picture: Bytes) -> Bytes:
     return np.asarray(np.rint(255 * srgb(picture / 255.0)), dtype=np.uint8)
 
 
-def bar(axes: Axes) -> None:
-    """A bar of BAR_PX pixels at the lower left."""
-    low, left = axes.get_ylim()[0] - 40, axes.get_xlim()[0] + 40
-    axes.plot([left, left + BAR_PX], [low, low], color="white", linewidth=3)
-    axes.text(left, low - 15, f"{BAR_PX} px", color="white", fontsize=9)
-
-
 def photographs(run: Path, calibration: Path) -> None:
     """One stop lit, and by LED 1 with rings about the highlights that the calibration used."""
     with (calibration / "residuals.csv").open(encoding="utf-8", newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["photograph"] == f"{PHOTOGRAPH}_led_1"]
-    figure, both = plt.subplots(1, 2, figsize=(9, 5.9), layout="constrained")
-    for axes, phase, title in zip(both, ("lit", "led_1"), ("lit", "by LED 1"), strict=True):
+    figure, both = plt.subplots(1, 2, figsize=(11, 5), layout="constrained")
+    titles = {"lit": "lit", "led_1": "by LED 1: highlights by the number of their ball"}
+    for axes, (phase, title) in zip(both, titles.items(), strict=True):
         picture = np.asarray(Image.open(run / "photographs" / f"{PHOTOGRAPH}_{phase}.png"))
-        axes.imshow(encoded(picture)[PART])
+        axes.imshow(maximum_filter(encoded(picture), (4, 4, 1))[PART])  # else spots are too small
         axes.set_title(title, fontsize=11)
         axes.set_axis_off()
-        bar(axes)
-    for row in rows:
+        axes.plot([40, 40 + BAR_PX], [1000, 1000], color="white", linewidth=3)
+        axes.text(40, 980, f"{BAR_PX} px", color="white", fontsize=9)
+    for row in (row for row in rows if row["used"] == "1"):
         at = float(row["column_px"]) - PART[1].start, float(row["row_px"])
-        colour = "#E69F00" if row["used"] == "1" else "#999999"
-        both[1].plot(*at, "o", markersize=14, fillstyle="none", color=colour)
-        text = f"ball {row['ball']}" + ("" if row["used"] == "1" else ", left out")
-        both[1].text(at[0] + 30, at[1] + 10, text, color=colour, fontsize=9)
+        both[1].plot(*at, "o", markersize=11, fillstyle="none", color="#E69F00")
+        both[1].text(at[0] + 20, at[1] - 12, row["ball"], color="#E69F00", fontsize=9)
     figure.savefig(PICTURES / "loop-photographs.png", dpi=110)
 
 
