@@ -144,7 +144,8 @@ def explained(word: str, entries: Iterable[ReferenceEntry]) -> list[ReferenceEnt
 def _spellings(word: str) -> Iterator[str]:
     """A name as it is compared: as given, in the singular, with the unit of a key."""
     name = plain(word)
-    yield from (name, name.removesuffix("s"), *(name + unit for unit in KEY_UNITS))
+    yield from (name, name.removesuffix("s"))
+    yield from (name + unit for unit in KEY_UNITS if name)
 
 
 def _term_entry(term: Term) -> ReferenceEntry:
