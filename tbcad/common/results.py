@@ -114,7 +114,7 @@ class PlotPanel:
     names: tuple[str, ...] = ()
 
 
-def plot_file(panels: tuple[PlotPanel, ...], kind: PlotFormat = "png") -> bytes:
+def plot_file(panels: tuple[PlotPanel, ...], kind: PlotFormat = "svg") -> bytes:
     """Panels side by side as a file; the same panels give the same bytes."""
     width, height = PANEL_INCHES
 
@@ -197,7 +197,7 @@ class Study:
 
 
 def write_study(
-    study: Study, out: Path, more: dict[str, bytes] | None = None, plot: PlotFormat = "png"
+    study: Study, out: Path, more: dict[str, bytes] | None = None, plot: PlotFormat = "svg"
 ) -> list[Path]:
     """Write a study's CSV files, notes and plot, and more, into a folder; only these are replaced.
 
@@ -208,7 +208,7 @@ def write_study(
     return replace_files(out, study_files(study, plot) | (more or {}))
 
 
-def study_files(study: Study, plot: PlotFormat = "png") -> dict[str, bytes]:
+def study_files(study: Study, plot: PlotFormat = "svg") -> dict[str, bytes]:
     """The files of a study by name: the same study gives the same bytes."""
     tables = (study.summary, *study.tables)
     files = {f"{table.name}.csv": csv_text(table).encode() for table in tables}

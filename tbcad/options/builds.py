@@ -72,7 +72,7 @@ class OptimizeOptions(Call):
     resume: bool = False
     """Go on with a search that was stopped."""
     force: ForceFile = False
-    plot: PlotFormatOption = "png"
+    plot: PlotFormatOption = "svg"
     scheduler: Scheduler = None
 
     @property

@@ -55,7 +55,7 @@ class CalibrateOptions(Call):
     intrinsics: Annotated[AnyPath | None, typer.Option(metavar="FILE")] = None
     """Lens of the camera as OpenCV (YAML, XML), ROS, Kalibr (YAML), mrcal (.cameramodel), COLMAP
     (cameras.txt) or tbcad intrinsics wrote it. By default the lens is estimated too."""
-    plot: PlotFormatOption = "png"
+    plot: PlotFormatOption = "svg"
     force: Force = False
 
 

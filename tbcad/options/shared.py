@@ -63,8 +63,8 @@ UpOption = Annotated[Literal["y", "z"] | None, typer.Option("--up")]
 """The axis of the object's file that points up; by default y for GLB and glTF, else z."""
 UnitOption = Annotated[Literal["mm", "cm", "m", "in"] | None, typer.Option("--unit")]
 """Of the object's file; by default m for GLB and glTF, what a 3MF says, else mm."""
-PlotFormatOption = Annotated[Literal["png", "svg", "pdf"], typer.Option("--format")]
-"""Of plots: png, or svg and pdf for papers."""
+PlotFormatOption = Annotated[Literal["svg", "png", "pdf"], typer.Option("--format")]
+"""Of plots: svg and pdf have lines and text at any size, png has pixels."""
 METHODS = (
     "nearest: the colour of the nearest captured ray, as in the paper; depth: the mean of several "
     "virtual cameras at the depth that the light field itself shows"

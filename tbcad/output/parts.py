@@ -9,6 +9,7 @@ from tbcad.prototype.suitable import check_suitable
 
 SHELL, PROTOTYPE = "shell", "prototype"
 PARTS = (SHELL, PROTOTYPE)
+NAMED = "name shell, prototype or shell,prototype"
 
 
 def parse_parts(text: str) -> tuple[str, ...]:
@@ -18,9 +19,9 @@ def parse_parts(text: str) -> tuple[str, ...]:
     """
     named = {name.strip() for name in text.split(",") if name.strip()}
     if odd := sorted(named - {*PARTS}):
-        raise InputError(f"--parts: {odd[0]!r} is no part: name {', '.join(PARTS)} or one of them")
+        raise InputError(f"--parts: {odd[0]!r} is no part: {NAMED}")
     if not named:
-        raise InputError(f"--parts: nothing to build: name {', '.join(PARTS)} or one of them")
+        raise InputError(f"--parts: nothing to build: {NAMED}")
     return tuple(name for name in PARTS if name in named)
 
 

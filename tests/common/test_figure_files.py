@@ -5,7 +5,15 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from tbcad.common.figure_files import CYCLE, SHADES, PlotFormat, figure_file, legend_below, shades
+from tbcad.common.figure_files import (
+    CYCLE,
+    SHADES,
+    PlotFormat,
+    figure_file,
+    legend_below,
+    rounded_svg,
+    shades,
+)
 
 INCHES = (4.0, 3.0)
 BEGINNING = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
@@ -25,6 +33,13 @@ def test_the_same_figure_gives_the_same_file_of_each_kind(kind: PlotFormat) -> N
     with matplotlib.rc_context({"lines.linewidth": 9, "svg.hashsalt": "other"}):
         assert figure_file(draw, INCHES, kind) == first
     assert first.startswith(BEGINNING[kind])
+
+
+def test_svg_has_places_to_a_hundredth_of_a_point() -> None:
+    text = b'<path d="M 12.345678 -9.8" transform="scale(0.015625)"/><use x="1.999999"/>'
+    rounded = b'<path d="M 12.34 -9.8" transform="scale(0.015625)"/><use x="1.99"/>'
+    assert rounded_svg(text) == rounded
+    assert figure_file(draw, INCHES, "svg") == rounded_svg(figure_file(draw, INCHES, "svg"))
 
 
 def test_colours_are_those_of_the_palette() -> None:

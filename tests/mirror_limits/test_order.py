@@ -121,7 +121,7 @@ def test_what_is_refused(
     ):
         assert wrong in cli("order", "--process", "cnc", *words, code=2).err
     told = cli("inspection", exports, code=2).err
-    assert "tbcad inspection is called order: write tbcad order" in told
+    assert "tbcad inspection is now called order: write tbcad order" in told
     assert not out.exists()
 
 

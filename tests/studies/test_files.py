@@ -197,7 +197,7 @@ def test_command_writes_and_shows(tmp_path: Path, cli: Callable[..., Any]) -> No
     shown = cli("study", "capture-area", "--from", "4", "--to", "4", "--out", out).out
     assert "21.2 mm" in shown
     assert "capture-area.csv" in shown
-    assert (out / "capture-area.png").stat().st_size > 10_000
+    assert (out / "capture-area.svg").stat().st_size > 10_000
 
 
 # The paper's lens does not hold the few large mirrors of a small n.

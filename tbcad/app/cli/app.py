@@ -163,7 +163,7 @@ def _command(prepare: Callable[..., Work], subject: Callable[..., object]) -> Ca
     def command(
         out: Out[Path] = STUDIES,
         json: JsonResult = False,
-        plot: PlotFormatOption = "png",
+        plot: PlotFormatOption = "svg",
         **options: Any,
     ) -> int:
         given = {name: options.pop(name) for name in signature(subject).parameters}

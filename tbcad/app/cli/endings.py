@@ -108,7 +108,7 @@ RENAMED = {"inspection": "order", "export": "dataset"}  # commands, as they were
 def check_is_not_renamed(arguments: Sequence[str]) -> None:
     """Refuse the former name of a command, and say the new one."""
     if arguments and (new := RENAMED.get(arguments[0])):
-        raise InputError(f"tbcad {arguments[0]} is called {new}: write tbcad {new}")
+        raise InputError(f"tbcad {arguments[0]} is now called {new}: write tbcad {new}")
 
 
 def usage_error_text(error: typer.TyperException) -> str:

@@ -9,7 +9,6 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.models import CommandInfo
 
-LINE = 99  # characters of a command's first line, at most
 HEADINGS = {
     "Design and build": (
         *("init", "optimize", "build", "verify", "report", "picture", "camera"),
@@ -50,12 +49,17 @@ class PlainGroup(TyperGroup):
         super().__init__(*arguments, **{**given, "rich_markup_mode": None})
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write a section for each heading."""
-        for title, names in HEADINGS.items():
+        """Write a section for each heading; of a group within tbcad, all its commands."""
+        own = {"Commands": tuple(self.list_commands(ctx))}
+        for title, names in (own if ctx.parent else HEADINGS).items():
             with formatter.section(title):
                 found = [(name, self.get_command(ctx, name)) for name in names]
-                rows = [(name, one.get_short_help_str(LINE)) for name, one in found if one]
+                rows = [(name, _first_paragraph(one.help)) for name, one in found if one]
                 formatter.write_dl(rows)
+
+
+def _first_paragraph(text: str | None) -> str:
+    return " ".join((text or "").partition("\n\n")[0].split())
 
 
 class Plain(TyperCommand):

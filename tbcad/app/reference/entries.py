@@ -88,6 +88,7 @@ def _symbol(term: Term) -> str:
 
 
 GREEK = {"θ": "theta", "\N{GREEK SMALL LETTER RHO}": "rho"}
+KEY_UNITS = ("mm", "deg", "um", "px", "percent")  # that names of keys end with
 MOST_SUGGESTED = 3
 LIKENESS = 0.6
 
@@ -130,13 +131,21 @@ def explained(word: str, entries: Iterable[ReferenceEntry]) -> list[ReferenceEnt
             by_name.setdefault(plain(name), []).append(entry)
             if name.isascii() or plain(name) not in shown:  # what can be typed
                 shown[plain(name)] = name
-    found = {entry.kind + entry.name: entry for entry in by_name.get(plain(word), [])}
+    spelt = next(filter(by_name.get, _spellings(word)), "")
+    found = {entry.kind + entry.name: entry for entry in by_name.get(spelt, [])}
     if found:
         return list(found.values())
     near = get_close_matches(plain(word), by_name, MOST_SUGGESTED, LIKENESS)
     names = " or ".join(shown[one] for one in near)
     hint = f"did you mean {names}?" if near else "tbcad explain lists what there is"
     raise InputError(f"nothing is known of {word!r}: {hint}")
+
+
+def _spellings(word: str) -> Iterator[str]:
+    """A name as it is compared: as given, in the singular, with the unit of a key."""
+    name = plain(word)
+    yield from (name, name.removesuffix("s"))
+    yield from (name + unit for unit in KEY_UNITS if name)
 
 
 def _term_entry(term: Term) -> ReferenceEntry:

@@ -171,8 +171,8 @@ def _prototype(verdict: Verdict | None, as_made: AsMade | None, target_mm: float
 
 def _yield_words(builds: int, target_mm: float) -> str:
     return (
-        f"<p>Share of {builds} simulated builds, or fewer where {enough_bad(builds)} failed, whose "
-        f"every virtual camera sees {target_mm:g} mm, and the median of their minimum coverage:</p>"
+        f"<p>Share of {builds} simulated builds, or fewer where {enough_bad(builds)} failed, in "
+        f"which every virtual camera sees {target_mm:g} mm; median of their minimum coverage:</p>"
     )
 
 

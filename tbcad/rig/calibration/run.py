@@ -171,7 +171,7 @@ def write_calibration(
     result: MachineCalibration,
     judged: CalibrationVerdict,
     basis: dict[str, Any],
-    plot: PlotFormat = "png",
+    plot: PlotFormat = "svg",
 ) -> dict[str, Any]:
     """Write all files of a calibration into the caller's folder, and return its record."""
     record = calibration_record(result, judged, basis)
@@ -193,7 +193,7 @@ def write_calibration(
 
 
 def write_recovered(
-    folder: Path, result: MachineCalibration, truth: Machine, plot: PlotFormat = "png"
+    folder: Path, result: MachineCalibration, truth: Machine, plot: PlotFormat = "svg"
 ) -> str:
     """Write recovered.csv and its plot of a simulated run, and return what they say."""
     kinds = recovered_errors(result, truth)

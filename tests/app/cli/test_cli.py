@@ -26,7 +26,7 @@ def test_build_verifies_and_verify_agrees(tmp_path: Path, cli: Command) -> None:
     out = tmp_path / "exports"
     shown = cli(*WIDE, "--out", out)
     assert shown.out.startswith("Files: PASS, ")
-    assert "that see 60 mm; medians:" in shown.out
+    assert "at 60 mm; median coverage:" in shown.out
     assert len(shown.out.splitlines()) <= MAX_LINES
     assert "Traceback" not in shown.err
     verified = (out / "verify.json").read_bytes()

@@ -35,7 +35,7 @@ WORDS = ("optimize", "--set", "n=4", "--candidates", "80", "--out", "found/bette
 
 def test_design_table_and_plot(cli: Command) -> None:
     printed, folder = cli(*WORDS).out, Path("found")
-    names = {"better.toml", "better-candidates.csv", "better-candidates.jsonl", "better.png"}
+    names = {"better.toml", "better-candidates.csv", "better-candidates.jsonl", "better.svg"}
     assert {file.name for file in folder.iterdir()} == names
     table = tomllib.loads((folder / "better.toml").read_text(encoding="utf-8"))
     rows = read_csv(folder / "better-candidates.csv")

@@ -21,7 +21,7 @@ SMALL = ["camera.width_px=208", "camera.height_px=155"]
 FILES = {
     "tolerance-cameras.csv", "tolerance-builds.csv", "tolerance-notes.txt",
     "tolerance-processes.csv", "tolerance-sensitivity.csv", "tolerance-summary.csv",
-    "tolerance.json", "tolerance.png",
+    "tolerance.json", "tolerance.svg",
 }  # fmt: skip
 # Of ten machines in each step of a search, nine are to be good.
 LOSS = itemgetter("loss_mm")

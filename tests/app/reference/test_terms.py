@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tbcad.app.reference.entries import glossary
+from tbcad.app.reference.entries import explained, glossary, terms_and_keys
 from tbcad.app.reference.keys import ELSEWHERE, design_template, key_sections, unit_of
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import dotted_fields, section_of
@@ -119,3 +119,15 @@ def test_every_key_and_section_of_the_models_is_described() -> None:
     assert unit_of("mirrors.margin_mm") == "mm"
     assert unit_of("prototype.motion.feed_deg_min") == "degrees per minute"
     assert unit_of("optics.n") == unit_of("prototype.motion.safety") == ""
+
+
+@pytest.mark.parametrize(
+    ("word", "name"),
+    [
+        ("fillets", "cutter radius"),
+        ("medians", "median minimum"),
+        ("structure error", "mesh.structure_error_mm"),
+    ],
+)
+def test_words_are_found_in_the_plural_and_keys_without_their_unit(word: str, name: str) -> None:
+    assert [one.name for one in explained(word, terms_and_keys())] == [name]

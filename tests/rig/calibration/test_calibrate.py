@@ -277,7 +277,7 @@ def test_command_and_its_files(
     again.mkdir()
     basis = {key: record[key] for key in BASIS}
     write_calibration(again, calibrated, verdict(calibrated), basis)
-    files = {file.name for file in out.iterdir()} - {"recovered.csv", "recovered.png"}
+    files = {file.name for file in out.iterdir()} - {"recovered.csv", "recovered.svg"}
     assert {file.name for file in again.iterdir()} == files
     for name in files - {"manifest.json"}:
         assert (again / name).read_bytes() == (out / name).read_bytes(), name

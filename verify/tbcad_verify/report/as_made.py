@@ -85,8 +85,8 @@ def as_made_lines(as_made: AsMade | None, target_mm: float, valleys: bool) -> It
         return
     fail = enough_bad(as_made.builds)
     yield (
-        f"Yield: share of {as_made.builds} simulated builds, or until {fail} fail, that see "
-        f"{target_mm:g} mm; medians:"
+        f"Yield of {as_made.builds} simulated builds, or until {fail} fail, at {target_mm:g} mm; "
+        "median coverage:"
     )
     yield _medians(as_made)
     yield f"  left out: {NOT_MODELLED}{'; fillets, ridges not in solids' * valleys}"

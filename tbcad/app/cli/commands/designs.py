@@ -128,7 +128,7 @@ def tolerance(
     options: ToleranceOptions,
     as_built: AsBuiltOption = None,
     out: Out[Path] = Path("tolerance"),
-    plot: PlotFormatOption = "png",
+    plot: PlotFormatOption = "svg",
     json: JsonResult = False,
 ) -> int:
     """Simulate many builds with random errors: how many reach the target, and what limits them.

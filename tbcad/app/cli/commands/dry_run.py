@@ -53,6 +53,7 @@ def overview_lines(figures: Overview, seconds: float) -> Iterator[str]:
         radii=radii,
         shells=figures.shell_prints and _print_text(figures.shell_prints),
         prototype=made,
+        bought_balls=made and made.balls,
         balls=made and _counted(made.balls, "ball"),
         caps=f" and {_counted(made.caps, 'cap')}" if made and made.caps else "",
         ball_price=made and _price_text(made.ball_price),
@@ -71,7 +72,7 @@ def overview_record(figures: Overview, seconds: float) -> dict[str, Any]:
 def _print_text(figures: PrintEstimate) -> str:
     return (
         f"{figures.volume_cm3:.0f} cm3, about {figures.mass_g:.0f} g, {figures.hours:.0f} h, "
-        f"{_price_text(figures.price)} by FDM"
+        f"{_price_text(figures.price)}, printed by FDM"
     )
 
 

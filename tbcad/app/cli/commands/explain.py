@@ -17,10 +17,10 @@ KINDS = ("term", "section", "key", "check", "process")
 INDENT = 13  # columns, of what stands behind a heading
 
 
-NameOption = Annotated[str | None, typer.Argument(metavar="NAME")]
+NameOption = Annotated[list[str] | None, typer.Argument(metavar="NAME")]
 """A term or symbol (theta1), a key of a design or its end (margin_mm), a value of one (traced), a
 process (cnc), a column of a table (coverage_mm), or a check or figure of the verification
-("coverage, facets"); without it, all names."""
+(coverage, facets); without it, all names."""
 
 
 @app.command()
@@ -36,11 +36,11 @@ def explain(
     from tbcad.app.reference.entries import explained, terms_and_keys
 
     entries = [*terms_and_keys(), *_checks(), *_processes()]
-    if name is None:
+    if not name:
         names = {kind: _names(entries, kind) for kind in KINDS}
         print_result({"schema": SCHEMA, **names}, _lists(entries), json)
         return 0
-    found = explained(name, entries)
+    found = explained(" ".join(name), entries)
     record = {"schema": SCHEMA, "found": [entry.record for entry in found]}
     print_result(record, ["\n\n".join("\n".join(_lines(entry)) for entry in found)], json)
     return 0

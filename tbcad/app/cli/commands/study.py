@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tbcad.app.cli.app import Work, app, of_design, of_export
+from tbcad.app.cli.help_texts import PlainGroup
 from tbcad.errors import InputError
 from tbcad.options.call import tell_options
 from tbcad.options.captures import Optics
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     from tbcad.light.simulate.views.viewpoints import ViewMethod
 
 study = typer.Typer(
+    cls=PlainGroup,
     no_args_is_help=True,
-    rich_markup_mode=None,
     help="Reproduce a study of the paper: tables, notes and a plot, next to the paper's figures.",
 )
 app.add_typer(study, name="study")

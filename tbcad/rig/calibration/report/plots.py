@@ -32,7 +32,7 @@ TITLE_LINE = 26  # letters
 
 
 def plots(
-    result: MachineCalibration, spheres: Floats, kind: PlotFormat = "png"
+    result: MachineCalibration, spheres: Floats, kind: PlotFormat = "svg"
 ) -> dict[str, bytes]:
     """All plots by the names of their files; covariances of spheres in mm^2, (k, 4, 4)."""
     drawn = {

@@ -211,7 +211,7 @@ def test_every_case_has_figures(export: ExportedDesign) -> None:
         for one in ("mm", "mrad"):
             low, high = (table.numbers(f"{one}_{share}") for share in SHARES)
             assert ((low > 0) & (low <= high)).all()
-    assert study_files(found)["calibration.png"].startswith(b"\x89PNG")
+    assert study_files(found)["calibration.svg"].startswith(b"<?xml")
     records = whole.records()
     leds = [row["mm_50"] for row in records if row["layout"] == "best"]
     noises = [row["mm_50"] for row in records if row["layout"] == "design"][: len(NOISES_PX)]
