@@ -51,7 +51,7 @@ TOLERANCE = 1e-6
 
 
 def in_turn(function: Callable[P, R]) -> Callable[P, R]:
-    """Let threads of a process take turns: the kernel fails where two cut shapes that share faces."""
+    """Let threads of a process take turns: two cuts of shapes that share faces can fail."""
 
     @wraps(function)
     def alone(*arguments: P.args, **keywords: P.kwargs) -> R:

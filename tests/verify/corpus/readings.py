@@ -24,6 +24,7 @@ from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.light.lamp_light import EdgedBodies
 from tbcad_verify.prototype.light.pinhole_cells import mirror_spheres
 from tbcad_verify.prototype.light.windows import ray_transfer
+from tbcad_verify.prototype.swing import AxialSolid
 from tbcad_verify.record.export import Export
 from tbcad_verify.record.files import FileBytes
 from tbcad_verify.record.prototype import Lamps
