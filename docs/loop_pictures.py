@@ -19,7 +19,6 @@ from scipy.ndimage import maximum_filter
 
 import tbcad
 from tbcad.common.figure_files import srgb
-from tbcad.light.simulate.camera_photographs import photographed
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.prototype.run import read_plan
 from tbcad.light.simulate.scene.lamps import lit_by, read_lamps
@@ -97,20 +96,26 @@ def views(scene: Scene, sources: dict[str, LightField]) -> None:
 def main(build: Path, run: Path, calibration: Path) -> None:
     """Write the three pictures."""
     photographs(run, calibration)
-    export, frames = read_export(build), read_machine(calibration / RECORD)[1]
-    lamps, subject = read_lamps(build), run_object(read_export(build), None)
+    export, truth = read_export(build), read_machine(run / "truth.json")
+    lamps, subject = read_lamps(build), run_object(export, None)
     scene = prepared_scene(lit_by(lamps, subject) if lamps else subject)
-    perfect = photographed(export, scene, "prototype", 1, lambda _: None)
     with tempfile.TemporaryDirectory() as temp:
-        drawing, calibrated, drawn = (Path(temp) / name for name in ("drawing", "a", "b"))
-        drawing.mkdir()
-        write_machine(drawing / RECORD, designed_prototype(export, read_plan(export)), frames)
-        tbcad.merge(run, calibration, build, out=calibrated)
-        tbcad.merge(run, drawing, build, out=drawn)
-        merged(calibrated)
-        read = (LightField.read(calibrated), LightField.read(drawn))
-        names = ("perfect machine", "as calibrated", "by the drawing")
-        views(scene, dict(zip(names, (perfect, *read), strict=True)))
+        known, drawn = Path(temp) / "known", Path(temp) / "drawn"
+        machines = {known: truth[0], drawn: designed_prototype(export, read_plan(export))}
+        for folder, machine in machines.items():
+            folder.mkdir()
+            write_machine(folder / RECORD, machine, truth[1])
+        merges = {
+            "machine known exactly": known,
+            "as calibrated": calibration,
+            "by the drawing": drawn,
+        }
+        sources = {}
+        for name, folder in merges.items():
+            tbcad.merge(run, folder, build, out=Path(temp) / name)
+            sources[name] = LightField.read(Path(temp) / name)
+        merged(Path(temp) / "as calibrated")
+        views(scene, sources)
 
 
 if __name__ == "__main__":
