@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from tbcad_verify.run.processes import at_once
 
-from tbcad.cad.kernel.brep import InvalidSolidError, in_turn
+from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.common.schedule import Submit
 from tbcad.core.camera.sheet import RigLight, write_camera_sheet
 from tbcad.core.mirrors.array import MirrorDesign
@@ -37,7 +37,6 @@ class Export:
     note: str = ""  # why a part was left out, or cannot be used in every way; empty otherwise
 
 
-@in_turn
 def write_export(
     design: MirrorDesign,
     folder: Path,

@@ -10,7 +10,7 @@ from OCP.Standard import Standard_Failure
 from OCP.StdFail import StdFail_NotDone
 from tbcad_verify.run.processes import at_once
 
-from tbcad.cad.kernel.brep import InvalidSolidError, in_turn
+from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.common.schedule import Submit
 from tbcad.core.geometry.primitives import Component
 from tbcad.core.spec.design import Spec
@@ -44,7 +44,6 @@ PartsOrError: TypeAlias = list[PlacedSolid] | SpecError | InvalidSolidError
 FutureParts: TypeAlias = "Future[PartsOrError]"
 
 
-@in_turn
 def build_prototype_model(
     arranged: Iterable[PrototypeModel],
     progress: Progress = lambda _: None,

@@ -3,7 +3,6 @@
 import math
 import re
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import cadquery
@@ -18,7 +17,7 @@ from OCP.ShapeFix import ShapeFix_ShapeTolerance
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
 import tbcad
-from tbcad.cad.kernel.brep import KERNEL, InvalidSolidError, in_turn
+from tbcad.cad.kernel.brep import InvalidSolidError
 from tbcad.cad.kernel.checks import (
     face_integrals,
     plane_faces,
@@ -64,8 +63,6 @@ from tbcad.core.geometry.primitives import (
     volume as closed_volume,
 )
 from tbcad.core.geometry.vectors import norm, unit
-from tbcad.output.build import write_export
-from tbcad.prototype.model import build_prototype_model
 from tests.step_read_back import check_read_back
 
 BASE = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
@@ -261,13 +258,3 @@ def test_plane_faces_through_points() -> None:
     assert area == pytest.approx([8.0])
     assert len(plane_faces(box, points, 0.3)[1]) == 2
     assert not len(plane_faces(box, points[:0], 0.3)[1])
-
-
-def test_threads_take_turns_in_the_kernel() -> None:
-    @in_turn
-    def free_for_others() -> bool:
-        with ThreadPoolExecutor(1) as pool:
-            return pool.submit(KERNEL.acquire, blocking=False).result()
-
-    assert not free_for_others()
-    assert all(hasattr(one, "__wrapped__") for one in (write_export, build_prototype_model))

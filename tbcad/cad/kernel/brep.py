@@ -4,11 +4,8 @@ Coordinates come in for camera a; a `Maker` for camera b mirrors every point on 
 turns every wire round, so that both halves come from one description.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import wraps
-from threading import RLock
-from typing import ParamSpec, TypeVar
 
 import numpy as np
 from OCP.BRep import BRep_Builder
@@ -44,21 +41,8 @@ from tbcad.types import Floats
 
 Side = tuple[TopoDS_Edge, bool]
 Ring = Sequence[Side]
-P, R = ParamSpec("P"), TypeVar("R")
-KERNEL = RLock()
 
 TOLERANCE = 1e-6
-
-
-def in_turn(function: Callable[P, R]) -> Callable[P, R]:
-    """Let threads of a process take turns: two cuts of shapes that share faces can fail."""
-
-    @wraps(function)
-    def alone(*arguments: P.args, **keywords: P.kwargs) -> R:
-        with KERNEL:
-            return function(*arguments, **keywords)
-
-    return alone
 
 
 @dataclass(frozen=True)
