@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -91,14 +91,18 @@ def seconds(work: Callable[[], Any]) -> Figure:
 @contextmanager
 def cluster(workers: int, processes: bool = False) -> Iterator[str]:
     """A scheduler on loopback with workers of one thread, by its address."""
-    with LocalCluster(
+    made = LocalCluster(
         n_workers=workers,
         processes=processes,
         threads_per_worker=1,
         protocol="tcp",
         dashboard_address=None,
-    ) as made:
+    )
+    try:
         yield made.scheduler_address
+    finally:
+        with suppress(OSError):  # many workers on a busy machine may not end in time
+            made.close()
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
 from tbcad_verify.record.prototype import RECORD, SagTable
 from tbcad_verify.report.checks import check_names
+from tbcad_verify.run.kept import Store, keeping
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.step.step_file import StepFile, examine_all, load, read_step_files
 from tbcad_verify.types import Floats
@@ -333,6 +334,27 @@ def random_body(rng: np.random.Generator) -> Any:
     block = manifold3d.Manifold.cube(size, center=True).rotate(rng.uniform(0, 90, 3))
     ball = manifold3d.Manifold.sphere(size[0] / 2, 24)
     return (ball if rng.random() < 0.3 else block).translate(rng.uniform(-45, 45, 3))
+
+
+def test_sweeps_past_the_same_solids_are_kept(measured: MeasuredPrototype, tmp_path: Path) -> None:
+    import manifold3d
+
+    def swept(shift: float, ends: tuple[float, float] = (0.0, 1.0)) -> list[swing.PairSweep]:
+        arm, rod = (manifold3d.Manifold.cube([size, 2.0, 2.0]) for size in (90.0, 3.0))
+        one, two = (
+            swing.axial_solid(measured, "body", solid.translate([0, shift, 0]))
+            for solid, shift in ((arm, 80.0), (rod, shift))
+        )
+        return swing.sweeps_past(two, [one], ends)
+
+    expected = swept(84.0)
+    for settings, again in (((84.0,), False), ((84.0,), True), ((84.1,), False)):
+        with keeping(store := Store(tmp_path, "code")):
+            assert (swept(*settings) == expected) == (settings == (84.0,))
+        assert bool(store.reused) == again
+    with keeping(store := Store(tmp_path, "code")):
+        swept(84.0, (0.0, 1.1))
+    assert not store.reused
 
 
 @pytest.mark.parametrize("seed", range(4))
