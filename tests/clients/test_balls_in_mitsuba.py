@@ -153,11 +153,9 @@ def test_light_and_shadows_in_caps(photographed: Photographed) -> None:
     theirs = photographed.theirs("matt", [LAMP])
     lit = (photographed.compared > 0) & (np.maximum(ours, theirs).max(axis=2) > 10)
     apart = (ours - theirs)[lit]
-    print("matt", lit.sum(), theirs[lit].mean(), apart.mean(), np.sqrt(np.mean(apart**2)))
-    print("sharp", edges(ours, lit), edges(theirs, lit))
-    assert lit.sum() > 1000
+    assert lit.sum() > 500
     assert abs(apart.mean()) < 1
-    assert np.sqrt(np.mean(apart**2)) < 8
+    assert np.sqrt(np.mean(apart**2)) < 5  # of 27
     assert edges(ours, lit) == pytest.approx(edges(theirs, lit), rel=0.05)
 
 
@@ -174,6 +172,5 @@ def test_highlights_in_caps_are_where_theirs_are(photographed: Photographed) -> 
                 for light in (ours, theirs)
             ]
             apart.append(middles[0] - middles[1])
-            print(number, own.sum(), middles, ours[own].sum() / theirs[own].sum())
     assert len(apart) >= 2
     assert np.sqrt(np.mean(np.square(apart))) < 0.05

@@ -70,7 +70,7 @@ def led_sources(lamps: Lamps) -> list[Source]:
 def _source(one: tuple[Floats, Floats, float], sides: Floats) -> Source:
     """A small Lambertian face at a place, its normal and candela along it, with half sides."""
     place, facing, candela = one
-    area = 4 * np.linalg.norm(np.cross(*sides))
+    area = float(4 * np.linalg.norm(np.cross(*sides)))
     light = partial(lambertian, place[None], facing[None], np.array([candela]))
     return Source(place, light, sides, np.pi * MM2 * candela / area)
 

@@ -112,7 +112,7 @@ def detect(
     highlights = highlights_of(expected, paired, spots, sigma[np.maximum(partner, 0)])
     places = np.column_stack([expected.frame, expected.sphere, expected.led])[~used].tolist()
     rejected = dict(zip(map(tuple, places), reasons[~used].tolist(), strict=True))
-    sampling = sampling_shifts(expected, paired)
+    sampling = sampling_shifts(expected, paired, spots)
     return Detection(highlights, rejected, tuple(faults), sampling)
 
 

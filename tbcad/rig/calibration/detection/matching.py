@@ -215,15 +215,15 @@ def highlights_of(
     )
 
 
-def sampling_shifts(expected: Expected, partner: Ints) -> Floats:
+def sampling_shifts(expected: Expected, partner: Ints, spots: BrightSpots) -> Floats:
     """Pixels by which paired spots' centroids are off by sampling, for a lens's contrast of 1.
 
     Pixels take the light of their area, so a centroid of them is exact but for lines of one cycle
     a pixel, of which they pass none, but their slope: by Poisson's sum it is off by
     -1 / pi times the mean of sin(2 pi x) over the light, and the contrast of its blur, (n, 2).
     """
-    which = partner >= 0
-    phase = np.exp(2j * np.pi * (expected.pixel + expected.centroid)[which])
+    which = np.flatnonzero(partner >= 0)
+    phase = np.exp(2j * np.pi * spots.pixel[partner[which]])
     return np.asarray(-(expected.wave[which] * phase).imag / np.pi)
 
 
