@@ -76,6 +76,11 @@ def stage_layout(
         NECK_SHARE * _grazing_radius(prototype, keep_out.capture),
         NECK_OF_POST * post,
     )
+    if neck <= 0:
+        raise SpecError(
+            "light of the balls crosses the axis under the object, where the stage's neck would "
+            "be: make prototype.k another, or optics.capture_diameter_mm larger"
+        )
     led, leds = parts[stage.led], np.array(stage.leds_mm).reshape(-1, 3)
     plate = stage.top_mm - DISC_MM
     pockets = leds[:, 2] - (led["height_mm"] - led["diameter_mm"] / 2)
