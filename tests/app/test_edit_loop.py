@@ -84,6 +84,7 @@ def shells(out: Path, settings: tuple[str, ...]) -> list[str]:
     return said
 
 
+@pytest.mark.slow
 def test_two_builds_at_once_and_one_after_them_give_the_bytes_of_a_fresh_one(
     kept_in: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

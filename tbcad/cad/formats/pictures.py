@@ -27,7 +27,6 @@ from tbcad.cad.formats.pixels import (
     transparent,
     without_alpha,
 )
-from tbcad.cad.formats.png import SIGNATURE, plain_png
 from tbcad.errors import InputError
 
 RAW_SUFFIXES = (
@@ -41,7 +40,7 @@ PICTURE_SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", *RAW_SUFFIXES)
 FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF")  # beside TIFF and raw files
 _AS_THEY_ARE = ("L", "RGB", "I;16", "I;16B", "I;16L", "I;16N")
 _WITH_ALPHA = {"LA": "LA", "La": "LA", "RGBA": "RGBA", "RGBa": "RGBA", "P": "RGBA", "PA": "RGBA"}
-_PNG_DEPTH, _PNG_COLOUR = 24, 25  # places of a PNG header's bytes
+_PNG, _PNG_DEPTH, _PNG_COLOUR = b"\x89PNG\r\n\x1a\n", 24, 25  # places of its header's bytes
 _JPEG_SCAN, _JPEG_END = 0xDA, b"\xff\xd9"
 
 
@@ -100,8 +99,6 @@ def picture_of(data: bytes, name: str, ignore_alpha: bool = False) -> Picture:
         return raw_picture(data, name)
     if data.startswith(TIFF_SIGNATURES):
         return tiff_picture(data, name, ignore_alpha)
-    if (plain := plain_png(data)) is not None:
-        return plain
     try:
         with Image.open(BytesIO(data), formats=FORMATS) as image:
             return decoded(image, name, data, ignore_alpha)
@@ -118,7 +115,7 @@ def decoded(
     frames = getattr(image, "n_frames", 1)
     if frames > 1 and image.format != "MPO":  # a photograph, with previews after it
         raise InputError(f"{name} has {frames} pictures in it: save the one that is meant alone")
-    deep = data.startswith(SIGNATURE) and data[_PNG_DEPTH] == 16 and data[_PNG_COLOUR] > 0
+    deep = data.startswith(_PNG) and data[_PNG_DEPTH] == 16 and data[_PNG_COLOUR] > 0
     try:
         image.load()
         if data.startswith(b"\xff\xd8") and not _is_whole_jpeg(data):

@@ -15,7 +15,6 @@ import tifffile
 from PIL import Image
 
 from tbcad.cad.formats.pictures import decoded, picture_of, read_picture, visible_files
-from tbcad.cad.formats.png import plain_png
 from tbcad.errors import InputError
 from tbcad.rig.control.photographs import image_facts
 from tests.raw_photographs import dng
@@ -219,48 +218,6 @@ def test_orientation_and_profile_leave_the_numbers_alone() -> None:
     tags[0x0112] = 6  # turn by 90 degrees
     image = Image.fromarray(RGB)
     check(saved(image, "PNG", exif=tags, icc_profile=b"as of another screen"), RGB)
-
-
-def png(filters: list[int], pixels: np.ndarray, *others: bytes) -> bytes:
-    """A file whose rows have these filters, one after the other, by their definition."""
-    numbers, step = pixels.astype(int).reshape(len(pixels), -1), pixels[0, 0].size
-    left = np.pad(numbers, ((0, 0), (step, 0)))[:, :-step]
-    up, corner = (np.pad(one, ((1, 0), (0, 0)))[:-1] for one in (numbers, left))
-    away = np.abs([up - corner, left - corner, left + up - 2 * corner]).argmin(axis=0)
-    paeth = np.choose(away, [left, up, corner])
-    by = [0 * left, left, up, (left + up) // 2, paeth, left]
-    kinds = [filters[r % len(filters)] for r in range(len(pixels))]
-    rows = [bytes([k, *(numbers - by[k])[r] % 256]) for r, k in enumerate(kinds)]
-    head = struct.pack(">IIBBBBB", *pixels.shape[1::-1], 8, 2 if step == 3 else 0, 0, 0, 0)
-    body = zlib.compress(b"".join(rows))
-    parts = (b"IHDR" + head, *others, b"IDAT" + body[:9], b"IDAT" + body[9:], b"IEND")
-    whole = (
-        (len(one) - 4).to_bytes(4, "big") + one + zlib.crc32(one).to_bytes(4, "big")
-        for one in parts
-    )
-    return b"\x89PNG\r\n\x1a\n" + b"".join(whole)
-
-
-@pytest.mark.parametrize("filters", [[0], [1], [2], [3], [4], [4, 0, 3, 1, 2]], ids=str)
-@pytest.mark.parametrize("pixels", [RGB, GREY, RGB[:1, :1]], ids=["colours", "grey", "one"])
-def test_plain_png_is_read_as_by_pillow(filters: list[int], pixels: np.ndarray) -> None:
-    data = png(filters, pixels)
-    quick = plain_png(data)
-    assert quick is not None
-    assert quick.dtype == np.uint8
-    for found in (quick, np.asarray(Image.open(BytesIO(data)))):
-        assert np.array_equal(found, pixels)
-
-
-def test_png_that_is_not_plain_or_not_whole_is_left_to_others() -> None:
-    data = png([0, 1], RGB)
-    assert plain_png(png([0, 5], RGB)) is None  # no such filter
-    assert plain_png(png([0], RGB, b"tRNS" + bytes(6))) is None
-    assert plain_png(b"\xff\xd8" + data) is None
-    for k in range(len(data)):
-        assert plain_png(data[:k]) is None
-        wrong = plain_png(data[:k] + bytes([data[k] ^ 1]) + data[k + 1 :])
-        assert wrong is None, k
 
 
 def test_hidden_files_are_no_photographs(tmp_path: Path) -> None:

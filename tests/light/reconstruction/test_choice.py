@@ -140,6 +140,7 @@ def test_view_dependence_is_chosen_where_it_predicts_better(
     assert choose(monkeypatch, -99, 2.0)[1] <= 5  # the walk ends
 
 
+@pytest.mark.slow
 def test_workers_of_a_cluster_choose_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(choice, "LEVELS", TINY.levels)
