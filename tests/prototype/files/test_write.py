@@ -77,5 +77,5 @@ def test_parts_by_name() -> None:
     assert parse_parts("prototype, shell") == PARTS
     assert parse_parts("prototype,") == ("prototype",)
     for text in ("", ",", "shells", "shell;prototype"):
-        with pytest.raises(InputError, match="name shell, prototype or one of them"):
+        with pytest.raises(InputError, match="name shell, prototype or shell,prototype"):
             parse_parts(text)

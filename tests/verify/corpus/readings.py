@@ -35,8 +35,8 @@ from tbcad_verify.step import step_file
 from tbcad_verify.step.step_file import StepFile
 from tbcad_verify.types import Floats
 
-# Light of the shell's lamps is followed by a fifth of the bundles, on a quarter of the rows.
-COARSER = {"BUNDLES": 30_000, "ROWS": 16}
+# Light of the shell's lamps is followed by a fifth of the bundles, on 48 rows.
+COARSER = {"BUNDLES": 30_000, "ROWS": 48}
 MAX_BYTES = 1 << 26  # of a file that is read to know whether it was read before
 # Of an export, what no result depends on that is kept by the export.
 NOT_DERIVED_FROM = {"folder", "manifest", "digests"}

@@ -46,7 +46,7 @@ BELTS, SECTORS = 12, 12  # patches of equal area on the object, in height and ro
 RATIO = 4.0
 # From so far below the horizon on do virtual cameras see a surface at 60 degrees from its normal.
 LOWEST = -np.sin(np.radians(60.0))
-ROWS = 8  # one row of pixels of so many is followed for glare
+ROWS = 194  # of pixels are followed for glare, of a picture that has more
 GLARE = 0.5  # % of the pixels in use
 PLACE_MM = 0.1  # of an LED from the ring's face, across and along
 PLAY_MM = 1.0  # of the lens in the ring, on the diameter
@@ -226,9 +226,10 @@ def _glare(name: CheckName, light: ShellLight) -> Check:
 
 
 def glare(lamps: ShellLamps, sensor: SensorScene) -> tuple[int, int]:
-    """Pixels in use of one camera, one row of so many, and those that show an LED."""
+    """Pixels in use of one camera, on some rows, and those that show an LED."""
     setup, useful, bright = sensor.setup, 0, 0
-    for row in range(ROWS // 2, sensor.camera.height, ROWS):
+    every = max(sensor.camera.height // ROWS, 1)
+    for row in range(every // 2, sensor.camera.height, every):
         rays = pixel_rows(sensor.camera, row, row + 1)
         facet = first_hits(sensor.own, sensor.camera.pinhole[:, None], rays)
         on = np.flatnonzero(sensor.owner[facet] >= 0)
