@@ -92,7 +92,8 @@ def _fill(place: Floats, colour: Bytes, valid: Bools, total: Colours, hit: Bools
                 missing = not valid[square[k, 0], square[k, 1]]
                 if (count == 4 and k % 2 == 1) or (count == 3 and missing):
                     for j in range(3):
-                        corners[j] = square[(k + 1 + j) % 4]
+                        at = (k + 1 + j) % 4
+                        corners[j, 0], corners[j, 1] = square[at, 0], square[at, 1]
                     _fill_triangle(place, colour, corners, total, hit)
 
 

@@ -136,7 +136,8 @@ def add_gradient(
         i = ray[q]
         kind = _mixed(i, 0) % np.uint32(kinds)
         state = _mixed(i, seed)
-        off[:] = -colour[i]
+        for axis in range(3):
+            off[axis] = -colour[i, axis]
         for j in range(k):
             state = _mixed(state, j)
             jitter = np.float32(state >> np.uint32(8)) / np.float32(1 << 24)

@@ -250,9 +250,30 @@ def _candidates(pinholes: Floats, near: Ints, box: Floats, depth: Floats) -> Int
             continue
         least[j] = np.hypot(max(x - half_x, 0.0), max(y - half_y, 0.0)) / (high - z)
         most[j] = np.hypot(x + half_x, y + half_y) / (low - z) if low > z else np.inf
-    worst = np.partition(most, CAMERAS)[CAMERAS] if len(near) > CAMERAS else np.inf
-    kept: Ints = near[(least <= worst) & (least < np.inf)]
-    return kept
+    worst, count, kept = _of_rank(most, CAMERAS), 0, np.empty(len(near), dtype=np.int64)
+    for j in range(len(near)):
+        if least[j] <= worst and least[j] < np.inf:
+            kept[count] = near[j]
+            count += 1
+    return kept[:count]
+
+
+@compiled_loop
+def _of_rank(values: Floats, rank: int) -> float:
+    """The value that so many others come before, infinite if there are too few.
+
+    As `np.partition` has it, which takes numba six seconds to compile.
+    """
+    least = np.full(rank + 1, np.inf)
+    for value in values:
+        j = rank + 1
+        while j > 0 and least[j - 1] > value:
+            j -= 1
+            if j < rank:
+                least[j + 1] = least[j]
+        if j <= rank:
+            least[j] = value
+    return float(least[rank])
 
 
 @compiled_loop
