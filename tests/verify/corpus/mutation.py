@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from tests.verify.corpus.copies import change, copy, load, sign, store
 Job = Callable[[Path], Sequence[str] | None]
 HERE = VerifyOptions(write=False, apart=False)
 DROP = object()
+TOGETHER = 6  # mutations of one verification: so few that none hides another
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,11 @@ class Mutation:
 
     def __str__(self) -> str:
         return f"{self.kind}: {self.name}"
+
+    @property
+    def joinable(self) -> bool:
+        """Whether it is measured, before which others may be made in the same copy."""
+        return self.status == 1 and not self.unknown and not self.during and self.signed
 
 
 def fails(name: str, kind: str, job: Job, checks: str | tuple[str, ...], *words: str) -> Mutation:
@@ -120,6 +127,50 @@ def as_bytes(name: str, how: Callable[[bytes], bytes]) -> Job:
         change(folder, name, how)
 
     return job
+
+
+def batches(mutations: Sequence[Mutation], solitary: Set[str] = frozenset()) -> list[Batch]:
+    """Mutations that fail different checks, together: one verification must tell each of them.
+
+    Verified alone is what cannot be read, after which other checks cannot be made, and what is
+    named as solitary: other checks need what it takes away.
+    """
+    alike = Counter(one.checks for one in mutations)
+    found: list[list[Mutation]] = []
+    for one in sorted(mutations, key=lambda one: -alike[one.checks]):
+        fits = (
+            some
+            for some in found
+            if len(some) < TOGETHER
+            and one.joinable
+            and not {name for other in some for name in other.checks} & {*one.checks}
+        )
+        if not (mine := next(fits, [])) and one.joinable:
+            found.append(mine)
+        mine.append(one)
+    alone = [one for one in mutations if one.name in solitary or not one.joinable]
+    joined = [[one for one in some if one.name not in solitary] for some in found]
+    return [*map(Batch, joined), *(Batch([one]) for one in alone)]
+
+
+class Batch(tuple[Mutation, ...]):
+    """Mutations of one verification."""
+
+    def __str__(self) -> str:
+        return str(self[0]) + (f" and {len(self) - 1} more" if len(self) > 1 else "")
+
+    def attempt(self, export: Path, room: Path) -> str:
+        """As `attempt`, all of them in one copy."""
+        if len(self) == 1:
+            return attempt(self[0], export, room)
+        folder = copy(export, room / "export")
+        words = [[*one.words, *(one.job(folder) or ())] for one in self]
+        sign(folder)
+        checks = verify(folder, lambda _: None, HERE).checks
+        shutil.rmtree(room)
+        wanting = [_verdict(*each, checks) for each in zip(self, words, strict=True)]
+        told = zip(self, wanting, strict=True)
+        return "\n".join(f"{one}: {words}" for one, words in told if words)
 
 
 def attempt(mutation: Mutation, export: Path, room: Path) -> str:
