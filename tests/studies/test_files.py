@@ -49,12 +49,11 @@ HOPELESS = (*SMALL, "n=9", "camera_mm=[174, 24, -243]", "semi_minor_mm=78",
 
 @pytest.fixture(scope="module")
 def small() -> Study:
-    return small_resolution()
+    return small_resolution(range(3, 8), Sensor(208, 155), Sensor(416, 310))
 
 
-def small_resolution() -> Study:
-    sensors, ratios = (Sensor(208, 155), Sensor(416, 310)), (Ratio(1, 1), Ratio(1, 4))
-    return resolution(load_spec(None, SMALL), range(3, 8), sensors, ratios)
+def small_resolution(n: range, *sensors: Sensor) -> Study:
+    return resolution(load_spec(None, SMALL), n, sensors, (Ratio(1, 1), Ratio(1, 4)))
 
 
 def test_resolution_finds_what_its_rows_say(small: Study) -> None:
@@ -80,13 +79,11 @@ def test_resolution_finds_what_its_rows_say(small: Study) -> None:
     assert not any("apex" in one.quantity for one in small.figures)  # has no such sensors
 
 
-def test_any_number_of_threads_gives_the_same_files(
-    small: Study, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    files = study_files(small)
+def test_any_number_of_threads_gives_the_same_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    files = study_files(small_resolution(range(3, 5), Sensor(208, 155)))
     monkeypatch.setattr(parallel, "THREADS", 1)
     monkeypatch.setattr(schedule, "cores", lambda: 1)
-    assert study_files(small_resolution()) == files
+    assert study_files(small_resolution(range(3, 5), Sensor(208, 155))) == files
     assert len(files) == 5
 
 
@@ -139,7 +136,9 @@ def test_elevation_of_the_paper_design() -> None:
     assert bands.where(elevation_from_deg=15.0).numbers("mean_seeing_px")[0] == pytest.approx(mean)
 
 
-def test_depth_of_flat_mirrors_and_the_paper_range() -> None:
+def test_depth_of_flat_mirrors_and_the_paper_range(monkeypatch: pytest.MonkeyPatch) -> None:
+    small = (Sensor(208, 155),)  # as good as four of up to 8320 x 6208
+    monkeypatch.setattr("tbcad.studies.depth_of_field.default_sensors", lambda _: small)
     study = depth_of_field(load_spec(None, ["n=4"]), LensOptions())
     (flat,) = study.summary.where(quantity="camera to farthest image, flat radii").records()
     assert flat["tbcad"] == pytest.approx(2 * math.sqrt(15000) + 30, rel=1e-12)
@@ -148,6 +147,9 @@ def test_depth_of_flat_mirrors_and_the_paper_range() -> None:
     assert [row[1:4] for row in paper.rows] == [(150, 250, pytest.approx(187.5))] * 3
     # Closed form: with 2080 pixels across 89 degrees a pixel is 2 tan(44.5 deg) / 2080 wide at
     # unit distance, and pupil = 2 pixel / (1/150 - 1/250).
+    assert (study.tables[2].numbers("best_pupil_mm") > 0).tolist() == [
+        True
+    ] * 3  # radii by each rule
     (limited,) = paper.where(stop="blur limited").records()
     width = 2 * math.tan(math.radians(44.5)) / 2080
     assert limited["pupil_mm"] == pytest.approx(2 * width / (1 / 150 - 1 / 250), rel=1e-12)

@@ -166,7 +166,9 @@ def test_pinholes_of_the_synthetic_aperture() -> None:
 
 @pytest.fixture(scope="module")
 def depths() -> dict[str, float]:
-    study = depth_of_field(load_spec(None), LensOptions())
+    with pytest.MonkeyPatch.context() as patch:  # pupils count pixels: tests/studies/test_files.py
+        patch.setattr("tbcad.studies.depth_of_field.default_sensors", lambda _: ())
+        study = depth_of_field(load_spec(None), LensOptions())
     return {f.quantity: f.value for f in study.figures if isinstance(f.value, float)}
 
 

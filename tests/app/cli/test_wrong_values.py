@@ -44,6 +44,7 @@ def _no_work(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     monkeypatch.setattr(sys.modules["tbcad.app.cli.app"], "stages", begun)
     monkeypatch.setattr("tbcad.app.api.designs._checked_store", begun)
     monkeypatch.setattr("tbcad.app.doctor.diagnose", begun)
+    monkeypatch.setattr("tbcad.core.camera.requirements.camera_requirements", begun)
     monkeypatch.chdir(tmp_path)
 
 
