@@ -52,7 +52,7 @@ def optics(draw: st.DrawFn) -> list[str]:
 @example(options=of_optics([163.6, 0, -127], 67.9, 24.6))  # a cell whose foot side bends inward
 @example(options=of_optics([216.3, -19.4, -109.2], 64.6, 26.2))  # not symmetrical
 @settings(
-    max_examples=16,
+    max_examples=8,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 def test_any_optics(options: list[str], tmp_path: Path) -> None:

@@ -252,7 +252,7 @@ def test_its_cube_is_about_the_origin() -> None:
     assert grid.pitch_mm == WIDTH / 4
 
 
-@pytest.mark.parametrize(("k", "n"), [(2, 9), (9, 4), (60, 100)])
+@pytest.mark.parametrize(("k", "n"), [(2, 9), (9, 4), (20, 33)])
 def test_linear_values_stay_linear_on_other_lattices(k: int, n: int) -> None:
     def plane(n: int) -> np.ndarray:
         x, y, z = np.meshgrid(*[np.linspace(-1, 1, n)] * 3, indexing="ij")

@@ -261,14 +261,13 @@ def test_caps_that_turn_too_much_show_too_little(
     assert (after[here] < before[here] - 0.1).all()
 
 
-@pytest.mark.parametrize("weight", [0.0, 0.5])
 def test_coverage_by_rays_on_a_fine_outline(
-    context: PrototypeContext, measured: MeasuredPrototype, weight: float
+    context: PrototypeContext, measured: MeasuredPrototype
 ) -> None:
     """One mirror by a plain loop over many directions; weight moves balls, and turns the cap."""
     seats = places(measured)
-    rigid = weight * np.array([0.02, -0.01, 0.015])
-    rest = np.random.default_rng(2).normal(0, 0.1 * weight, seats.shape)
+    rigid = np.array([0.01, -0.005, 0.0075])
+    rest = np.random.default_rng(2).normal(0, 0.05, seats.shape)
     for k, place in enumerate(seats):  # of which no motion is left
         motion = bodies.rigid_motions(place)
         rest[k] -= (motion @ np.linalg.pinv(motion) @ rest[k].ravel()).reshape(-1, 3)
