@@ -97,7 +97,7 @@ def test_interval_of_the_mean_difference() -> None:
 def test_prototype_against_the_shell(export_folder: Path) -> None:
     """Fewer pixels and other virtual cameras: views that are slightly worse."""
     export = read_export(export_folder)
-    viewpoints = viewpoints_around((20.0, 60.0), 2, 640.0)
+    viewpoints = SmallViews(**vars(viewpoints_around((20.0, 60.0), 2, 640.0)))
     found = prototype_vs_shell(export, built_in_object(60.0), viewpoints, BY_NEAREST, 2)
     rows = {figure.quantity: figure.value for figure in found.figures}
     shell, balls = (rows[f"mean SSIM of the {name}'s views"] for name in ("shell", "prototype"))
@@ -117,7 +117,7 @@ def test_prototype_against_the_shell(export_folder: Path) -> None:
 @pytest.mark.slow
 def test_low_pass_filter_blurs_the_views(export_folder: Path) -> None:
     """Section 5.3: the wider the filter, the lower the contrast, and the blurrier every view."""
-    viewpoints = viewpoints_around((30.0,), 1, 640.0)
+    viewpoints = SmallViews(**vars(viewpoints_around((30.0,), 1, 640.0)))
     options = BlurOptions((1.0, 3.0), (3.0,), 1)
     found = low_pass(read_export(export_folder), built_in_object(60.0), viewpoints, options)
     means = found.tables[1]
