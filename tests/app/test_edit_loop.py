@@ -12,7 +12,10 @@ from tbcad.common.reuse import VARIABLE, code_digest, store, told
 from tbcad.core.spec.design import Spec, without_sections
 
 EDITS = 20
-SMALL = ("optics.n=3", "optics.capture_diameter_mm=35")
+SMALL = (
+    *("optics.n=3", "optics.capture_diameter_mm=35", "prototype.k=3"),
+    *("camera.width_px=416", "camera.height_px=310"),
+)
 # Keys of a sequence, each with values that fit all others.
 VALUES = {
     "prototype.stage.led_ma": (8, 10, 12),
@@ -123,6 +126,7 @@ def test_twenty_edits_give_the_bytes_of_fresh_builds(
                 build(None, tmp_path / place, settings=settings, verify=number == EDITS)
                 found.append(contents(tmp_path / place))
         one, other = found[0], found[-1]
+        assert {"shell_a.step", "prototype.step"} <= {*one}
         assert not [name for name in one | other if one.get(name) != other.get(name)], settings
 
 
