@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from tbcad.core.optics.camera import Camera
 from tbcad.light.simulate.capture.light_field import LightField
 from tbcad.light.simulate.scene.rays import camera_around_object, view_directions
-from tbcad.light.simulate.views.blend import CAMERAS, SIGMA_PX, blend_cameras
+from tbcad.light.simulate.views.blend import CAMERAS, SIGMA_PX, _of_rank, blend_cameras
 from tbcad.light.simulate.views.mirror_tiles import MirrorTiles, convergence_point
 from tbcad.light.simulate.views.ray_bundle import RayBundle, TwoPlane, nearest_rays, two_plane_along
 from tbcad.light.simulate.views.synthesis import Rays, nearby_rays, search_radius
@@ -172,3 +172,12 @@ def test_a_surface_behind_all_cameras_is_not_seen(tiles: MirrorTiles) -> None:
     behind = np.full(len(targets), 2 * bundle.pinholes[:, 2].min())
     seen: Bools = blend_cameras(bundle, targets, behind)[1]
     assert not seen.any()
+
+
+@pytest.mark.parametrize("count", [1, CAMERAS, CAMERAS + 1, 40])
+def test_a_value_by_its_rank_is_that_of_numpy(count: int) -> None:
+    """With equal values and infinite ones."""
+    values = np.random.default_rng(count).integers(0, 9, count).astype(float)
+    values[values > 7] = np.inf
+    expected = np.partition(values, CAMERAS)[CAMERAS] if count > CAMERAS else np.inf
+    assert _of_rank(values, CAMERAS) == expected
