@@ -11,7 +11,7 @@ from tbcad.cad.drafting.views import FRONT
 from tbcad.cad.formats.entities import Circle, Layer, Line, Text
 from tbcad.cad.formats.glb import ColouredMesh, write_glb
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.drawings.assembly_sheet import EYES, assembly_sheets
+from tbcad.drawings.write import EYES, assembly_sheets
 
 BOX, POST = (40.0, 20.0, 10.0), (5.0, 5.0, 30.0)
 

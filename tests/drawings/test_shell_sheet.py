@@ -14,9 +14,8 @@ from tbcad.cad.formats.entities import Layer, Polyline, Text
 from tbcad.core.mirrors.array import design
 from tbcad.core.spec.load import load_spec
 from tbcad.drawings.export import read_export
-from tbcad.drawings.shell_sheet import draw_shell
 from tbcad.drawings.shell_views import HATCH_MM, hatching
-from tbcad.drawings.write import drawable
+from tbcad.drawings.write import draw_shell, drawable
 from tbcad.output.build import write_export
 from tbcad.output.parts import SHELL
 

@@ -23,7 +23,6 @@ from tbcad.light.simulate.views.mirror_tiles import MirrorTiles
 from tbcad.light.simulate.views.ray_bundle import TwoPlane, two_plane_along
 from tbcad.light.simulate.views.refocus import ThinLens, refocus
 from tbcad.light.simulate.views.synthesis import synthesise
-from tbcad.light.viewer.moving import moving_view
 from tbcad.light.viewer.page import Query
 from tbcad.light.viewer.render import (
     BEGIN,
@@ -31,6 +30,7 @@ from tbcad.light.viewer.render import (
     WEBP_QUALITIES,
     Turntable,
     field_renderer,
+    moving_view,
     smallest_loss,
     turntable_page,
     write_turntable,

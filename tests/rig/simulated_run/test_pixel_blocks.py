@@ -7,8 +7,13 @@ from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import LensCamera
 from tbcad.light.simulate.capture.sensor import pixel_directions
 from tbcad.rig.simulated_run import photographs
-from tbcad.rig.simulated_run.photographs import PointSpread, blurred
-from tbcad.rig.simulated_run.pixel_blocks import SIDE, boxes_about, pixel_blocks
+from tbcad.rig.simulated_run.photographs import (
+    SIDE,
+    PointSpread,
+    blurred,
+    boxes_about,
+    pixel_blocks,
+)
 
 SIZE = (250, 330)  # rows and columns: no multiples of a block
 LENS = LensCamera(
