@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from tbcad.common.compiled import compiled_loop, compiled_part
 from tbcad.common.reuse import kept
 from tbcad.core.geometry.loop_vectors import Vector, divided, dot, minus, plus_scaled, unit, vector
-from tbcad.core.geometry.vectors import norm
+from tbcad.core.optics.lamp_light import lambertian
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.types import Floats, Ints
 
@@ -100,14 +100,7 @@ def light_by_mirrors(
 
 def direct_light(lamps: Lamps, places: Floats, normals: Floats) -> Floats:
     """Irradiance (k,) of surfaces at places (k, 3) with unit normals (k, 3), lux; no shadows."""
-    total = np.zeros(len(places))
-    for place, way, candela in zip(lamps.places, lamps.normals, lamps.candela, strict=True):
-        toward = place - places
-        distance = norm(toward)
-        leaves = np.maximum(-(toward @ way), 0) / distance
-        meets = np.maximum((toward * normals).sum(axis=1), 0) / distance
-        total += MM2 * candela * leaves * meets / distance**2
-    return total
+    return lambertian(lamps.places, lamps.normals, lamps.candela, places, normals)
 
 
 @compiled_loop
