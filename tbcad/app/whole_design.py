@@ -65,11 +65,11 @@ class Design(MirrorDesign):
             SpecError: flanges or holes do not fit; it says what to change.
             InvalidSolidError: the CAD kernel finds the solid invalid, which is a fault of tbcad.
         """
-        from tbcad.cad.kernel.solids import as_part
+        from tbcad.cad.kernel.solids import as_part, one_solid
         from tbcad.shell.files import camera_solid
 
         solid = camera_solid(self, self._array(camera))
-        return as_part(solid.name, solid.shape)
+        return as_part(solid.name, one_solid(solid.name, solid.shape))
 
     def mandrel(self, camera: Literal["a", "b"] = "a") -> "Part":
         """Return the negative of one camera's shell as a build123d part, in the same frame.
@@ -78,11 +78,11 @@ class Design(MirrorDesign):
             SpecError: its holes do not fit; it says what to change.
             InvalidSolidError: the CAD kernel finds the solid invalid, which is a fault of tbcad.
         """
-        from tbcad.cad.kernel.solids import as_part
+        from tbcad.cad.kernel.solids import as_part, one_solid
         from tbcad.shell.files import mandrel_solid
 
         solid = mandrel_solid(self, self._array(camera))
-        return as_part(solid.name, solid.shape)
+        return as_part(solid.name, one_solid(solid.name, solid.shape))
 
     def _array(self, camera: str) -> MirrorArray:
         if camera not in ("a", "b"):

@@ -59,12 +59,13 @@ def _sources() -> Iterator[bytes]:
     for package in ("tbcad", "tbcad_verify"):
         spec = find_spec(package)
         root = Path(spec.origin or "").parent if spec else Path()
-        files = (path for path in root.rglob("*") if path.is_file() and path.suffix != ".pyc")
-        # compiled loops are written beside the sources
-        files = (path for path in files if "__pycache__" not in path.parts)
-        for path in sorted(files):
-            yield path.relative_to(root).as_posix().encode()
-            yield sha256(path.read_bytes()).digest()
+        for folder, inner, names in os.walk(root):
+            # compiled loops are written beside the sources
+            inner[:] = sorted(name for name in inner if name != "__pycache__")
+            for name in sorted(name for name in names if not name.endswith(".pyc")):
+                path = Path(folder, name)
+                yield path.relative_to(root).as_posix().encode()
+                yield sha256(path.read_bytes()).digest()
 
 
 def _libraries() -> Iterator[bytes]:

@@ -240,9 +240,10 @@ def _supported(group: _Group, use: PrintSettings, each: float) -> tuple[float, f
     dense = min(whole, group.interface.area() * layers)
     pitch, close = use["support_material_spacing"], use["support_material_interface_spacing"]
     speed, seconds, held = use["support_material_speed"], 0.0, 0.0
+    border = _length(group.support)
     slower = use["support_material_interface_speed"] / 100 * speed
     for part, pace, step in ((whole - dense, speed, pitch), (dense, slower, close)):
-        density, around = line / (line + step), _length(group.support) * part / whole
+        density, around = line / (line + step), border * part / whole
         held += part * density
         seconds += _lines(part * density, around * density, pace, use, line + step, line)
     if group.bottom:

@@ -20,7 +20,7 @@ from tbcad.cad.kernel.checks import (
     properties_within,
 )
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.cad.kernel.solids import faces, one_solid, reversed_faces
+from tbcad.cad.kernel.solids import faces, reversed_faces
 from tbcad.common.reuse import kept
 from tbcad.core.geometry.vectors import FLIP_X
 from tbcad.core.mirrors.array import MirrorArray, MirrorDesign
@@ -63,7 +63,10 @@ def write_half_mesh(folder: Path, files: dict[str, str], mesh: Mesh, array: Mirr
 def write_shell_solids(
     design: MirrorDesign, envelope: Envelope, folder: Path, progress: Progress = lambda _: None
 ) -> None:
-    """Write both shells as STEP; the envelope closes camera a's half; or InvalidSolidError."""
+    """Write both shells as STEP; the envelope closes camera a's half.
+
+    Whether the kernel finds them valid, the verification asks of what it reads.
+    """
     # The kernel integrates a back to some 1e-6 only, and alike in its mirror image only where the
     # design is symmetrical about y = 0.
     known, symmetric = None, design.spec.optics.camera_mm[1] == 0
@@ -81,8 +84,7 @@ def camera_solid(
 ) -> Solid:
     """Solid of one camera's half, face by face; without an envelope it is worked out.
 
-    SpecError if flanges or holes do not fit, InvalidSolidError if the kernel finds camera a's
-    invalid; b's is its mirror image.
+    SpecError if flanges or holes do not fit. Nothing asks the kernel whether it is valid.
     """
     closing = envelope or shell_envelope(design)
     return _half_solid("shell", design, array, lambda front: casing_faces(front, closing))
@@ -102,9 +104,7 @@ def _half_solid(
     names = [*array.ids, *wall_names(array.ids, cells)]
     named = zip(names, own if kind == "shell" else reversed_faces(own), strict=True)
     faces = [*named, *closed]
-    solid = maker.solid([face for _, face in faces])
-    # The kernel's check would find of the mirror image what it found of camera a's half.
-    return Solid(name, solid if maker.mirrored else one_solid(name, solid), tuple(faces))
+    return Solid(name, maker.solid([face for _, face in faces]), tuple(faces))
 
 
 def wall_names(ids: Sequence[str], cells: Cells) -> list[str]:
@@ -176,7 +176,7 @@ def _plane_with_holes(
 
 @kept("mandrels")
 def write_mandrels(design: MirrorDesign, mandrel: Mandrel, folder: Path) -> None:
-    """Write both negatives, the mandrel being a's, as STEP, STL and 3MF; or InvalidSolidError."""
+    """Write both negatives, the mandrel being a's, as STEP, STL and 3MF."""
     mesh = camera_a_mandrel_mesh(design, mandrel)
     for array in design.arrays:
         files = part_files("mandrel", array)

@@ -17,7 +17,7 @@ from OCP.ShapeFix import ShapeFix_ShapeTolerance
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
 import tbcad
-from tbcad.cad.kernel.brep import InvalidSolidError
+from tbcad.cad.kernel.brep import InvalidSolidError, Solid
 from tbcad.cad.kernel.checks import (
     face_integrals,
     plane_faces,
@@ -121,15 +121,19 @@ def test_several_solids_are_refused() -> None:
         one_solid("part", two)
 
 
-def test_a_solid_with_an_open_shell_is_refused() -> None:
+def open_solid() -> TopoDS_Solid:
     builder, shell, solid = BRep_Builder(), TopoDS_Shell(), TopoDS_Solid()
     builder.MakeShell(shell)
     for face in faces(box(2.0, 3.0))[:-1]:
         builder.Add(shell, face)
     builder.MakeSolid(solid)
     builder.Add(solid, shell)
+    return solid
+
+
+def test_a_solid_with_an_open_shell_is_refused() -> None:
     with pytest.raises(InvalidSolidError, match="the kernel's check finds the solid invalid"):
-        one_solid("part", solid)
+        one_solid("part", open_solid())
 
 
 def test_cavities_are_filled() -> None:
@@ -141,6 +145,17 @@ def test_cavities_are_filled() -> None:
 @pytest.fixture(scope="module")
 def design() -> tbcad.Design:
     return tbcad.design(n=3)
+
+
+def test_a_shell_that_the_kernel_refuses_is_no_part(
+    design: tbcad.Design, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of what a build writes its verification asks; of this nobody else does."""
+    for name, get in (("camera", design.shell), ("mandrel", design.mandrel)):
+        refused = Solid("part", open_solid(), ())
+        monkeypatch.setattr(f"tbcad.shell.files.{name}_solid", lambda *_, solid=refused: solid)
+        with pytest.raises(InvalidSolidError, match="part: the kernel's check"):
+            get("a")
 
 
 def test_a_shell_in_cadquery_is_the_same_solid(design: tbcad.Design) -> None:

@@ -120,8 +120,12 @@ def build(options: BuildOptions) -> Build:
     Raises:
         InputError: the folder cannot be replaced, or the spec is not allowed; nothing is written.
     """
-    started, plan = monotonic(), planned(options)
-    plan = replace(plan, spec=spec_for_process(plan, options))
+    return build_planned(planned(options), options)
+
+
+def build_planned(plan: BuildPlan, options: BuildOptions) -> Build:
+    """Build what was planned by the same options; `InputError` as of `build`."""
+    started, plan = monotonic(), replace(plan, spec=spec_for_process(plan, options))
     options.progress("mirrors: radii and cells")
     with reusing(options.fresh, options.answer):
         finished = _build_files(plan, options)

@@ -27,7 +27,7 @@ class LinePicture:
     """What is seen of bodies from a direction."""
 
     lines: tuple[Line, ...]  # visible edges, x to the right and y up, mm
-    # of each body that is seen: a visible point in its middle, mm
+    # of each body that is seen in thick lines: a visible point in its middle, mm
     anchors: dict[str, Point]
 
 
@@ -58,7 +58,7 @@ def seen_lines(
     for name in names:
         layer = Layer.RAYS if name in thin else Layer.CUT
         lines.update(_visible(_pieces(bodies[name], axes[2], piece), rays, axes, layer))
-    found = {name: _anchor(bodies[name], rays, axes) for name in names}
+    found = {name: _anchor(bodies[name], rays, axes) for name in names if name not in thin}
     anchors = {name: anchor for name, anchor in found.items() if anchor is not None}
     return LinePicture(tuple(sorted(lines, key=lambda one: (one.start, one.end))), anchors)
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from OCP.BRep import BRep_Builder
 from OCP.STEPConstruct import STEPConstruct, STEPConstruct_Styles
@@ -26,7 +27,7 @@ from tbcad.cad.formats.step import (
 )
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.cad.kernel.meshing import meshed
-from tbcad.cad.kernel.solids import moved, solids
+from tbcad.cad.kernel.solids import from_bytes, moved, solids, to_bytes
 from tbcad.types import Floats
 
 DISPLAY_MM, DISPLAY_ANGLE = 0.1, 0.25  # of meshes that are only looked at
@@ -40,6 +41,14 @@ class ColouredSolid:
     shape: TopoDS_Solid  # in its place, the base at angle zero
     colour: Colour  # red, green, blue (sRGB) and opacity, from 0 to 1
     mesh: Mesh | None = None  # of the shape; None where none is known
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The kernel's shape as bytes: a key of what is kept is made of them."""
+        return {**self.__dict__, "shape": to_bytes(self.shape)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Read the shape again."""
+        self.__dict__.update(state, shape=from_bytes(state["shape"]))
 
     def copy(self, name: str, axes: Floats, origin: Floats) -> "ColouredSolid":
         """One like it under another name, moved: axes are what x, y and z become, as rows."""

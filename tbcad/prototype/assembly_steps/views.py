@@ -70,9 +70,8 @@ def whole_picture(machine: AssembledMachine, bodies: Bodies, room: Box) -> list[
 
 
 def _moved(mesh: trimesh.Trimesh, way: Floats) -> trimesh.Trimesh:
-    found = mesh.copy()
-    found.apply_translation(way)
-    return found
+    """A mesh elsewhere; one in its place is itself, so that its edges are found once."""
+    return mesh.copy(include_cache=True).apply_translation(way) if way.any() else mesh
 
 
 @kept("pictures")

@@ -69,22 +69,23 @@ class BallFit:
         return float(self.pixels.sum() / self.pixels_shell.sum())
 
 
-def ball_fit(candidates: BallCandidates, balls: Balls) -> BallFit:
-    """Views of the balls in place of the mirrors."""
+def ball_fit(candidates: BallCandidates, balls: Balls, pixels_shell: Floats) -> BallFit:
+    """Views of the balls in place of the mirrors; `shell_pixels` are those of any balls."""
     array, groups = candidates.array, candidates.groups
-    shell = used_outlines(
-        ball_poses(array.ellipsoid, array.polar),
-        array.mirrors.radius,
-        2 * array.ellipsoid.linear_eccentricity,
-        candidates.target / 2,
-    )
     return BallFit(
         ball=groups.group_of,
         coverage=candidates.coverage(balls.radius, moved=True),
         coverage_fixed=candidates.coverage(balls.radius, moved=False),
-        pixels_shell=_pixels(array, shell),
+        pixels_shell=pixels_shell,
         pixels=_pixels(array, balls.outline[groups.group_of]),
     )
+
+
+def shell_pixels(array: MirrorArray, capture: float) -> Floats:
+    """Pixels of the capture sphere of a radius (mm) in the shell's picture, (m,)."""
+    poses = ball_poses(array.ellipsoid, array.polar)
+    pinhole = 2 * array.ellipsoid.linear_eccentricity
+    return _pixels(array, used_outlines(poses, array.mirrors.radius, pinhole, capture))
 
 
 def _pixels(array: MirrorArray, outline: Floats) -> Floats:
@@ -109,7 +110,7 @@ def ball_alternatives(
         ruled, chosen, shown = spec.prototype.model_copy(update=rule), balls, fit
         if ruled != spec.prototype:
             chosen = choose_balls(candidates, ruled, balls.catalogue)
-            shown = ball_fit(candidates, chosen)
+            shown = ball_fit(candidates, chosen, fit.pixels_shell)
         alternatives.append(
             Alternative(
                 name=name,
@@ -220,8 +221,13 @@ class BallChoices:
             limits, target = self.spec.prototype, self.spec.optics.capture_diameter_mm
             candidates = ball_candidates(self.array, self.groups(k), target, limits.ball_margin_mm)
             balls = choose_balls(candidates, limits, self._catalogue)
-            self._chosen[k] = candidates.groups, balls, ball_fit(candidates, balls)
+            fit = ball_fit(candidates, balls, self._pixels_shell)
+            self._chosen[k] = candidates.groups, balls, fit
         return self._chosen[k]
+
+    @cached_property
+    def _pixels_shell(self) -> Floats:
+        return shell_pixels(self.array, self.spec.optics.capture_diameter_mm / 2)
 
     @cached_property
     def _catalogue(self) -> Catalogue:

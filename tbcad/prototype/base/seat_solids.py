@@ -23,6 +23,7 @@ from tbcad.cad.kernel.brep import Maker, Ring, hole_faces
 from tbcad.cad.kernel.checks import closed_mesh, properties
 from tbcad.cad.kernel.meshing import growth, primitive_mesh
 from tbcad.cad.kernel.solids import cylinder, faces, moved, on_sphere, one_solid, revolved, wires
+from tbcad.common.reuse import kept
 from tbcad.core.geometry.primitives import Cylinder, Revolved
 from tbcad.core.geometry.vectors import perpendicular_axes
 from tbcad.prototype.balls.layout import PrototypeLayout
@@ -179,14 +180,15 @@ def arc_about_axis(middle: float, radius: float, start: Point, end: Point) -> To
 
 def cap_parts(base: BaseLayout, prototype: PrototypeLayout, mesh_mm: float) -> list[PlacedSolid]:
     """A cap for each ball that is not bought, in its seat, its front up when it is printed."""
-    caps = np.flatnonzero(prototype.balls.cap).tolist()
-    return [_cap(base, prototype, k, mesh_mm) for k in caps]
+    balls = prototype.balls
+    sizes = zip(balls.radius.tolist(), balls.body_depth.tolist(), strict=True)
+    return [_cap(base, k, *size, mesh_mm) for k, size in enumerate(sizes) if balls.cap[k]]
 
 
-def _cap(base: BaseLayout, prototype: PrototypeLayout, k: int, mesh_mm: float) -> PlacedSolid:
-    seats, balls, name = base.seats, prototype.balls, f"cap_{k + 1}"
-    section = _section(base, float(balls.radius[k]), float(balls.body_depth[k]), k)
-    axes, centre = seats.axes[k], seats.centre[k]
+@kept("caps")
+def _cap(base: BaseLayout, k: int, front: float, depth: float, mesh_mm: float) -> PlacedSolid:
+    name, axes, centre = f"cap_{k + 1}", base.seats.axes[k], base.seats.centre[k]
+    section = _section(base, front, depth, k)
     shape = one_solid(name, moved(revolved(section), axes, centre))
     # The front is up and the flat lies on the bed.
     on_bed = axes.T @ UPSIDE_DOWN

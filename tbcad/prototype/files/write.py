@@ -99,7 +99,7 @@ def export_prototype(
     submit(write_glb, folder / GLB, "prototype", meshes)
     if built.sag:
         submit(write_sag, folder, built.sag)
-    write_assembly(folder / STEP, "prototype", groups)
+    _write_step(folder, groups)
     bill = _bill(built, [estimate.result() for estimate in prints], prices)
     write_table(folder / bom.NAME, bom.COLUMNS, bill)
     listed = bom.PartsList(tuple(bill), title)
@@ -116,6 +116,11 @@ def export_prototype(
     radius = spec.optics.capture_diameter_mm / 2
     write_camera_sheet(folder, design.arrays[0], radius, built.rig_light)
     return spec
+
+
+@kept("assembly")
+def _write_step(folder: Path, groups: Sequence[SolidGroup]) -> None:
+    write_assembly(folder / STEP, "prototype", groups)
 
 
 @kept("files of printed parts")

@@ -85,7 +85,7 @@ class TestBalls:
         def fitted(**rule: object) -> tuple[Balls, BallFit]:
             limits = LIMITS.model_copy(update=rule)
             balls = choose_balls(candidates, limits, catalogue)
-            return balls, ball_fit(candidates, balls)
+            return balls, ball_fit(candidates, balls, prototype.fit.pixels_shell)
 
         balls, _ = fitted(caps="none")
         assert balls.radius.max() == 30

@@ -19,7 +19,7 @@ from tbcad_verify.step.step_file import StepFile, examine_all, known, load, read
 
 from tbcad.cad.formats.step import write_step
 from tbcad.cad.kernel.brep import Solid
-from tbcad.cad.kernel.solids import solids
+from tbcad.cad.kernel.solids import polygon, prism, solids
 
 
 def written(folder: Path, *shapes: TopoDS_Shape) -> Path:
@@ -71,6 +71,12 @@ def test_box_in_closed_form(tmp_path: Path) -> None:
     assert sorted(faces.area) == pytest.approx([200, 200, 300, 300, 600, 600])
     outward = ((faces.middle - [1, 2, 3]) * faces.normal).sum(axis=1)
     assert sorted(outward) == pytest.approx([5, 5, 10, 10, 15, 15])
+
+
+def test_a_side_that_crosses_itself_is_not_valid(tmp_path: Path) -> None:
+    """The builder leaves it to the verification to ask this of a shell."""
+    crossed = np.array([[0.0, 0, 0], [10, 8, 0], [10, 0, 0], [0, 9, 0]])
+    assert not read_file(written(tmp_path, prism(polygon(crossed), 5 * np.eye(3)[2]))).valid
 
 
 def test_ball_and_its_hollow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

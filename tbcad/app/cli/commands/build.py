@@ -47,8 +47,7 @@ def build(
     output = output_mode(full, quiet, json)
     if not options.verify and not dry_run and output in ("full", "json"):
         raise InputError(f"--{output} shows a verification: leave --no-verify out")
-    from tbcad.app.api import build as build_files
-    from tbcad.app.api.builds import planned, spec_for_process
+    from tbcad.app.api.builds import build_planned, planned, spec_for_process
     from tbcad.app.cli.memory import keep_freed_memory
     from tbcad.output.parts import PROTOTYPE
 
@@ -62,7 +61,7 @@ def build(
 
             spec = spec_for_process(plan, shown)
             return show_overview(spec, plan.parts, options.parts is None, output, screen)
-        built = build_files(shown)
+        built = build_planned(plan, shown)
     if built.report is None:
         note = f"{built.note}\n" if built.note else ""
         out = options.out
