@@ -102,12 +102,14 @@ def _numbers(names: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     for name, value in names.items():
         if isinstance(value, np.ndarray):
             yield name, value.tolist()
-        elif isinstance(value, (int, float)) or _is_of_numbers(value):
+        elif _is_of_numbers(value):
             yield name, value
 
 
 def _is_of_numbers(value: object) -> bool:
-    return isinstance(value, tuple) and all(isinstance(one, (int, float)) for one in value)
+    if isinstance(value, tuple):
+        return all(map(_is_of_numbers, value))
+    return isinstance(value, (int, float))
 
 
 @cache
