@@ -16,12 +16,15 @@ from time import time
 from tbcad_verify.run.kept import Store, keeping, kept
 
 from tbcad import _LOADED
+from tbcad.common.schedule import cores
 from tbcad.errors import InputError
 
 __all__ = ["check_is_apart", "code_digest", "kept", "reusing", "store", "told"]
 
 VARIABLE = "TBCAD_CACHE"  # the folder, "" for none; by default tbcad in the user's cache
 LIMIT = 2 << 30  # bytes that are kept: some ten builds at n = 18
+# Beginnings of variables that choose threads and kernels of numerical libraries.
+CHOOSING = ("BLIS_", "GOTO_", "MKL_", "NPY_", "NUMBA_", "OMP_", "OPENBLAS_")
 CLOCK_S = 2.0  # by which clocks of files are coarser than that of the system
 
 
@@ -149,8 +152,15 @@ def _with_needed(name: str, found: dict[str, Distribution]) -> dict[str, Distrib
 
 
 def _processor() -> Iterator[bytes]:
-    """Numerical libraries choose their code by it, and sums may end in another digit."""
+    """Numerical libraries choose their code by it, and sums may end in another digit.
+
+    So they do by the number of threads that share a sum: by cores, or as variables say.
+    """
     from numpy.lib import introspect  # of the loops that numpy chose, by function
 
+    yield f"{cores()} cores".encode()
+    for name, value in sorted(os.environ.items()):
+        if name.startswith(CHOOSING) and name != "NUMBA_CACHE_DIR":
+            yield f"{name}={value}".encode()
     yield f"{platform.python_version()} {platform.platform()}".encode()
     yield repr(introspect.opt_func_info()).encode()

@@ -272,6 +272,19 @@ def test_the_store_is_not_in_the_folder_that_is_replaced(
     assert store(False).folder == tmp_path / "kept"  # wherever a process goes
 
 
+def test_threads_of_sums_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One thread or two of OpenBLAS give other last digits, in a build from nothing too."""
+    before = reuse._digest()
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "7")
+    other = reuse._digest()
+    assert other != before
+    monkeypatch.setattr(reuse, "cores", lambda: 1000)
+    assert reuse._digest() not in (before, other)
+    monkeypatch.undo()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "elsewhere")
+    assert reuse._digest() == before
+
+
 def test_libraries_of_libraries_count() -> None:
     names = {line.split()[0] for line in reuse._libraries()}
     assert {b"cadquery-ocp", b"llvmlite", b"numpy"} <= names
