@@ -14,7 +14,6 @@ time. Loading this module is quick; each name is loaded when it is first used.
 """
 
 from importlib import import_module
-from time import time as _time
 from typing import TYPE_CHECKING
 
 from tbcad.version import __version__
@@ -83,9 +82,6 @@ __all__ = [
     "verify",
     "view",
 ]
-
-# Seconds of the clock: code that was changed later is not what this process runs.
-_LOADED = _time()
 
 _MODULES = {
     "Analysis": "tbcad.tolerancing.analysis",

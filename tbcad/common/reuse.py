@@ -15,9 +15,8 @@ from time import time
 
 from tbcad_verify.run.kept import Store, keeping, kept
 
-from tbcad import _LOADED
-from tbcad.common.schedule import cores
 from tbcad.errors import InputError
+from tbcad.version import LOADED
 
 __all__ = ["check_is_apart", "code_digest", "kept", "reusing", "store", "told"]
 
@@ -51,7 +50,7 @@ def reusing(fresh: bool, answer: Callable[[str], object]) -> Iterator[None]:
 def store(fresh: bool) -> Store:
     """The user's store; fresh: nothing of it is used. None is where others may write."""
     own = code_digest()
-    changed = own != _digest() or _changed_last() > _LOADED
+    changed = own != _digest() or _changed_last() > LOADED
     return Store(None if changed else _folder(), own, fresh)
 
 
@@ -158,7 +157,10 @@ def _processor() -> Iterator[bytes]:
     """
     from numpy.lib import introspect  # of the loops that numpy chose, by function
 
-    yield f"{cores()} cores".encode()
+    own = (
+        os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
+    )
+    yield f"{len(own)} cores".encode()
     for name, value in sorted(os.environ.items()):
         if name.startswith(CHOOSING) and name != "NUMBA_CACHE_DIR":
             yield f"{name}={value}".encode()

@@ -255,7 +255,7 @@ def test_code_that_is_newer_than_the_process_keeps_nothing(
     kept_in: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert store(False).folder == kept_in
-    monkeypatch.setattr(reuse, "_LOADED", 0.0)
+    monkeypatch.setattr(reuse, "LOADED", 0.0)
     assert store(False).folder is None
 
 
@@ -278,7 +278,7 @@ def test_threads_of_sums_count(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "7")
     other = reuse._digest()
     assert other != before
-    monkeypatch.setattr(reuse, "cores", lambda: 1000)
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: range(1000))
     assert reuse._digest() not in (before, other)
     monkeypatch.undo()
     monkeypatch.setenv("NUMBA_CACHE_DIR", "elsewhere")
