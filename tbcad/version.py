@@ -1,4 +1,4 @@
-"""The version of tbcad: the one record of it."""
+"""The version of tbcad: the one record of it; and when a process loaded it."""
 
 from time import time
 

@@ -157,10 +157,8 @@ def _processor() -> Iterator[bytes]:
     """
     from numpy.lib import introspect  # of the loops that numpy chose, by function
 
-    own = (
-        os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
-    )
-    yield f"{len(own)} cores".encode()
+    on_some = hasattr(os, "sched_getaffinity")
+    yield f"{len(os.sched_getaffinity(0)) if on_some else os.cpu_count()} cores".encode()
     for name, value in sorted(os.environ.items()):
         if name.startswith(CHOOSING) and name != "NUMBA_CACHE_DIR":
             yield f"{name}={value}".encode()
