@@ -36,7 +36,7 @@ def edges(folder: Path, rounds: int, builds: int = BUILDS) -> list[Row]:
     works = [partial(work, made[kind]) for work in (solid, mesh) for kind in KINDS]
     spent = [one.cpu for one in spent_in_turns(works, rounds)]
     rows = []
-    for what, valley, pedestal in (("B-rep", *spent[:2]), ("mesh", *spent[2:])):
+    for what, (valley, pedestal) in (("B-rep", spent[:2]), ("mesh", spent[2:])):
         rows += [
             measured(f"{what} of one half, processor time, spheres that meet", valley, "s"),
             measured(f"{what} of one half, processor time, pedestals", pedestal, "s"),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from simulation import BOTH, PLACE, photographed
-from timing import Row, at_least, at_most, measured, spent_in_turns
+from timing import Row, Work, at_least, at_most, measured, spent_in_turns
 
 from tbcad.core.optics.camera import Camera
 from tbcad.light.depth.depth_map import depth_views
@@ -53,7 +53,7 @@ def _views(source: LightField, made: Field, rounds: int) -> list[Row]:
     at = camera_around_object(*PLACE, source.capture_mm)
     tiles = MirrorTiles(source)
     depths = depth_views(tiles)
-    works = [
+    works: list[Work] = [
         partial(field_picture, made, at),
         partial(depths.of, at),
         partial(synthesise, tiles, at),

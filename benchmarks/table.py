@@ -32,13 +32,18 @@ BESIDE = (
 
 def table(name: str) -> str:
     """Circumstances of a run, and its rows in markdown."""
+    if not _file(name).exists():
+        return "Not measured yet."
     record = _record(name)
     return beside(record, _record("before")) if "commands" in record else rows_of(record)
 
 
+def _file(name: str) -> Path:
+    return HERE / "results" / f"{name}.json"
+
+
 def _record(name: str) -> dict[str, Any]:
-    text = (HERE / "results" / f"{name}.json").read_text(encoding="utf-8")
-    return dict(json.loads(text))
+    return dict(json.loads(_file(name).read_text(encoding="utf-8")))
 
 
 def beside(record: dict[str, Any], before: dict[str, Any]) -> str:

@@ -97,8 +97,9 @@ def hit(
 
 def full_sensor(setup: OpticalSetup, scene: RayScene) -> None:
     """The last stage of the verification: every pixel's ray, its reflection, and what it meets."""
+    own = replace(setup, scene=scene)
     for camera in setup.cameras:
-        light.full_sensor(replace(setup.sensor_scene(camera), scene=scene))
+        light.full_sensor(replace(setup.sensor_scene(camera), own=scene, setup=own))
 
 
 def straight(embree: Any, calls: Calls) -> None:

@@ -1,9 +1,20 @@
-"""Loops compiled by numba, which release the interpreter's lock."""
+"""Loops compiled by numba, which release the interpreter's lock.
 
-from collections.abc import Callable
-from typing import TypeVar
+Machine code is kept for the next process. numba compiles again where the loop's own module has
+changed; here also where one has that it brings loops or numbers from, and where a file is damaged.
+"""
 
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
 from numba import njit
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -38,8 +49,69 @@ def compiled_sum(function: Function) -> Function:
 
 
 def _compiled(function: Function, **options: str | bool) -> Function:
-    try:
-        result: Function = njit(nogil=True, cache=True, **options)(function)
-    except RuntimeError:  # no folder that may be written: compile in every process
-        result = njit(nogil=True, **options)(function)
-    return result
+    result: Any = njit(nogil=True, **options)(function)
+    with suppress(RuntimeError):  # no folder that may be written: compile in every process
+        result._cache = _MachineCode(function)
+    kept: Function = result
+    return kept
+
+
+class _MachineCode(FunctionCache):  # type: ignore[misc]
+    """Files of a loop's machine code."""
+
+    def __init__(self, function: Callable[..., object]) -> None:
+        super().__init__(function)
+        own = self._cache_file._source_stamp
+        self._cache_file._source_stamp = own, _stamp(function.__globals__)
+
+    def load_overload(self, *arguments: Any) -> Any:
+        """None where there is none, or none that can be read."""
+        with suppress(Exception):  # whatever pickle makes of a damaged file
+            return super().load_overload(*arguments)
+        with suppress(OSError):
+            self.flush()  # or what is compiled now could not be added
+        return None
+
+    def save_overload(self, *arguments: Any) -> None:
+        """Nothing is kept on a full disk."""
+        with suppress(OSError):
+            super().save_overload(*arguments)
+
+
+def _stamp(names: dict[str, Any]) -> str:
+    """Digest of what loops of a module follow from: modules that they are from, and numbers."""
+    found = sha256()
+    for module in _modules(names, {}).values():
+        found.update(_content(module["__file__"]))
+        found.update(repr(list(_numbers(module))).encode())
+    return found.hexdigest()
+
+
+def _modules(names: dict[str, Any], found: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """The names of a module, and of all that it has loops from, by module."""
+    if names["__name__"] not in found:
+        found[names["__name__"]] = names
+        for one in tuple(names.values()):
+            if isinstance(one, Dispatcher):
+                _modules(one.py_func.__globals__, found)
+    return found
+
+
+def _numbers(names: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Numbers of a module, of which loops have the values that they were compiled with."""
+    for name, value in names.items():
+        if isinstance(value, np.ndarray):
+            yield name, value.tolist()
+        elif _is_of_numbers(value):
+            yield name, value
+
+
+def _is_of_numbers(value: object) -> bool:
+    if isinstance(value, tuple):
+        return all(map(_is_of_numbers, value))
+    return isinstance(value, (int, float))
+
+
+@cache
+def _content(file: str) -> bytes:
+    return Path(file).read_bytes()

@@ -11,9 +11,11 @@ import pickle
 import platform
 import socket
 import warnings
+from asyncio import run_coroutine_threadsafe
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
+from concurrent.futures import wait as wait_for_futures
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache, partial
 from hashlib import sha256
@@ -172,10 +174,20 @@ def _gathered(
         except TimeoutError:
             check_workers()
             continue
-        for future, result in zip(done, client.gather(done), strict=True):
+        for future, result in zip(done, _fetched(client, done, check_workers), strict=True):
             results[future] = result
             progress(units[numbers[future]])
     return [results[future] for future in futures]
+
+
+def _fetched(client: Any, done: list[Any], check_workers: Callable[[], None]) -> list[Any]:
+    """Results of units that are done, however long they take to come, while both ends answer."""
+    coming = client.gather(done, asynchronous=True)
+    arrived = run_coroutine_threadsafe(coming, client.loop.asyncio_loop)
+    while not wait_for_futures([arrived], _CHECK_INTERVAL).done:
+        check_workers()
+    found: list[Any] = arrived.result()
+    return found
 
 
 @cache
@@ -262,18 +274,31 @@ def _cluster(address: str, patience: float) -> Iterator[Any]:
         _check_certificates(address)
     try:
         _check_greeting(address)
-        client = Client(address, timeout=_CONNECT_TIMEOUT, name="tbcad")
+        client = Client(address, timeout=_CONNECT_TIMEOUT, name="tbcad", set_as_default=False)
     except (OSError, ValueError):  # a time-out is an OSError
         raise InputError(
             f"--scheduler {address}: no Dask scheduler answers there: start "
             "`dask scheduler`, or give its address as tcp://host:8786"
         ) from None
-    with client:
-        try:
-            client.wait_for_workers(1, timeout=patience)
-        except TimeoutError:
-            raise _no_workers(address, patience) from None
-        yield client
+    except Exception as error:  # whatever comes of an answer of another version
+        raise InputError(
+            f"--scheduler {address}: what answers there is not understood by distributed "
+            f"{version('distributed')} of here ({type(error).__name__}): install the same there"
+        ) from None
+    try:
+        with client.as_current():
+            _wait_for_worker(client, address, patience)
+            yield client
+    finally:
+        with suppress(OSError):  # of a scheduler that no longer answers
+            client.close()
+
+
+def _wait_for_worker(client: Any, address: str, patience: float) -> None:
+    try:
+        client.wait_for_workers(1, timeout=patience)
+    except TimeoutError:
+        raise _no_workers(address, patience) from None
 
 
 def _check_certificates(address: str) -> None:
@@ -312,8 +337,8 @@ def _worker_check(client: Any, address: str, patience: float) -> Callable[[], No
     def check() -> None:
         nonlocal seen
         try:
-            workers = client.nthreads()
-        except (OSError, TimeoutError):
+            workers = client.sync(client.scheduler.ncores, callback_timeout=patience)
+        except (OSError, TimeoutError):  # it may be there and not answer
             raise _gone(address) from None
         if workers:
             seen = monotonic()

@@ -1,15 +1,21 @@
 """A build after changed keys has the bytes of one from nothing, and does again what they change."""
 
+import os
+import pickle
 import random
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from tbcad_verify.run.kept import STORE
 from tbcad_verify.run.processes import Processes
 
 from tbcad.app.api import build
 from tbcad.common import reuse
 from tbcad.common.reuse import VARIABLE, code_digest, store, told
 from tbcad.core.spec.design import Spec, without_sections
+from tbcad.errors import InputError
 
 EDITS = 20
 SMALL = (
@@ -166,3 +172,123 @@ def test_other_code_libraries_or_processor_have_another_digest(
             assert code_digest() != digest
     code_digest.cache_clear()
     assert code_digest() == digest
+
+
+def entry(kept_in: Path) -> Path:
+    """The only one of a store with the result of some work, which is there."""
+    own = store(False)
+    own.put("key", pickle.dumps("result"))
+    assert own.get("key") == "result"
+    (file,) = kept_in.iterdir()
+    return file
+
+
+def as_link(file: Path) -> None:
+    file.rename(file.with_name("elsewhere"))
+    file.symlink_to("elsewhere")
+
+
+def as_folder(file: Path) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+def as_pipe(file: Path) -> None:  # reading one would wait without end
+    file.unlink()
+    os.mkfifo(file)
+
+
+def as_nothing_there(file: Path) -> None:
+    file.unlink()
+    file.symlink_to("nowhere")
+
+
+def as_zeros(file: Path) -> None:
+    file.write_bytes(bytes(file.stat().st_size))
+
+
+def as_of_another_key(file: Path) -> None:
+    file.rename(file.with_name("kept-other"))
+    store(False).put("key", pickle.dumps("other"))
+    file.rename(file.with_name("kept-third"))
+    file.with_name("kept-other").rename(file)
+    file.write_bytes(file.with_name("kept-third").read_bytes()[:-1])
+
+
+@pytest.mark.parametrize(
+    "damaged",
+    [as_link, as_folder, as_pipe, as_nothing_there, as_zeros, as_of_another_key],
+)
+def test_what_is_no_whole_entry_of_ones_own_is_not_read(
+    kept_in: Path, damaged: Callable[[Path], None]
+) -> None:
+    file = entry(kept_in)
+    damaged(file)
+    assert store(False).get("key") is None
+    store(False).put("key", pickle.dumps("again"))
+    assert store(False).get("key") == (None if file.is_dir() else "again")
+    file.with_name("kept-last").write_bytes(bytes(100))
+    store(False).prune(0)  # whatever lies there
+    assert not [one for one in kept_in.iterdir() if one.is_file() and one.name != "elsewhere"]
+
+
+def test_what_another_user_wrote_is_not_read(kept_in: Path) -> None:
+    """Before the folder was closed to others."""
+    file = entry(kept_in)
+    with suppress(PermissionError):  # for root alone
+        os.chown(file, 12345, -1)
+        assert store(False).get("key") is None
+
+
+def test_code_that_changes_keeps_nothing(kept_in: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Old and new modules would be mixed in one process, under the digest of either."""
+    said: list[str] = []
+    store(False).put("before", pickle.dumps(1))
+    os.utime(*kept_in.iterdir(), times=(0, 0))
+    with reuse.reusing(False, said.append):
+        own = STORE.get()
+        assert own
+        own.put("within", pickle.dumps(2))
+        monkeypatch.setattr(reuse, "_processor", lambda: [b"changed"])
+    assert [file.name for file in kept_in.iterdir()] == ["kept-before"]
+    assert store(False).folder is None
+    monkeypatch.undo()
+
+
+def test_code_that_is_newer_than_the_process_keeps_nothing(
+    kept_in: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert store(False).folder == kept_in
+    monkeypatch.setattr(reuse, "LOADED", 0.0)
+    assert store(False).folder is None
+
+
+def test_the_store_is_not_in_the_folder_that_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for place in ("out", "out/kept"):
+        monkeypatch.setenv(VARIABLE, place)
+        with pytest.raises(InputError, match=rf"^{VARIABLE} is {place}, within the build's folder"):
+            build(None, "out", settings=SMALL, verify=False)
+        assert not [*tmp_path.iterdir()]
+    monkeypatch.setenv(VARIABLE, "kept")
+    assert store(False).folder == tmp_path / "kept"  # wherever a process goes
+
+
+def test_threads_of_sums_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One thread or two of OpenBLAS give other last digits, in a build from nothing too."""
+    before = reuse._digest()
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "7")
+    other = reuse._digest()
+    assert other != before
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(1000), raising=False)
+    assert reuse._digest() not in (before, other)
+    monkeypatch.undo()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "elsewhere")
+    assert reuse._digest() == before
+
+
+def test_libraries_of_libraries_count() -> None:
+    names = {line.split()[0] for line in reuse._libraries()}
+    assert {b"cadquery-ocp", b"llvmlite", b"numpy"} <= names

@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -380,6 +381,32 @@ class TestRefused:
             schedule._scheduler_errors(cluster.address),
         ):
             raise ModuleNotFoundError("tbcad.common", name="tbcad.common")
+
+    def test_a_scheduler_of_another_version(
+        self, standing: Cluster, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """As of 2024.2, whose `identity` takes no `n_workers`."""
+
+        def refuse(*_: object, **__: object) -> None:
+            raise TypeError("Scheduler.identity() got an unexpected keyword argument 'n_workers'")
+
+        monkeypatch.setattr("distributed.Client", refuse)
+        said = refusal(drawn, [1], standing.address)
+        assert f"not understood by distributed {version('distributed')} of here (TypeErr" in said
+
+    @pytest.mark.slow
+    def test_a_scheduler_that_stops_answering_in_mid_run(
+        self, cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(schedule, "_CHECK_INTERVAL", 0.3)
+        cluster.start(1)
+
+        def freeze(unit: int) -> None:
+            cluster.scheduler.send_signal(signal.SIGSTOP)
+
+        work = Marks(tmp_path / "marks").work(0.1)
+        said = refusal(work, range(50), cluster.address, freeze, patience=3)
+        assert "the scheduler went away" in said
 
     @pytest.mark.slow
     def test_a_unit_that_kills_its_workers(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import monotonic
@@ -68,23 +66,9 @@ class BuildPlan:
     process: Process | None  # that edges and margins are chosen for
 
 
-@contextmanager
-def reusing(fresh: bool, answer: Progress) -> Iterator[None]:
-    """Keep what is worked out in the block, use what is kept already, and say what was used."""
-    from tbcad_verify.run.kept import keeping
-
-    from tbcad.common.reuse import LIMIT, store, told
-
-    kept_in = store(fresh)
-    with keeping(kept_in):
-        yield
-    kept_in.prune(LIMIT)
-    if line := told(kept_in):
-        answer(line)
-
-
 def planned(options: BuildOptions) -> BuildPlan:
     """Refuse, before any work, what cannot be built or replaced."""
+    from tbcad.common.reuse import check_is_apart
     from tbcad.output.folder import check_replaceable
     from tbcad.output.parts import (
         check_is_used,
@@ -108,6 +92,7 @@ def planned(options: BuildOptions) -> BuildPlan:
     file = None if isinstance(options.spec, Spec) else options.spec
     inputs = [*design_files(spec, file), *files_named(options.process)]
     check_replaceable(Path(options.out), "build", options.force, inputs)
+    check_is_apart(Path(options.out))
     return BuildPlan(spec, parts, process)
 
 
@@ -125,6 +110,8 @@ def build(options: BuildOptions) -> Build:
 
 def build_planned(plan: BuildPlan, options: BuildOptions) -> Build:
     """Build what was planned by the same options; `InputError` as of `build`."""
+    from tbcad.common.reuse import reusing
+
     started, plan = monotonic(), replace(plan, spec=spec_for_process(plan, options))
     options.progress("mirrors: radii and cells")
     with reusing(options.fresh, options.answer):

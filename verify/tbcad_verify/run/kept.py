@@ -13,6 +13,7 @@ import contextlib
 import hashlib
 import os
 import pickle
+import stat
 import tempfile
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
@@ -44,6 +45,8 @@ class Store:
             return None
         file = self.folder / f"{PREFIX}{key}"
         try:
+            if not _is_own_file(file):
+                return None
             data = file.read_bytes()
             if _digest(key, data[DIGEST:]) != data[:DIGEST]:
                 file.unlink()
@@ -72,16 +75,25 @@ class Store:
 
     def prune(self, limit: int) -> None:
         """Remove what was not used for longest, until the rest has so many bytes at most."""
-        if self.folder is None:
-            return
-        with contextlib.suppress(OSError):
-            found = [(one.stat(), one) for one in self.folder.glob(f"{PREFIX}*")]
-            found.sort(key=lambda pair: -pair[0].st_mtime)
-            total = 0
-            for stat, file in found:
-                total += stat.st_size
-                if total > limit:
-                    file.unlink(missing_ok=True)
+        total = 0
+        for found, file in sorted(self._entries(), key=lambda pair: -pair[0].st_mtime):
+            total += found.st_size
+            if total > limit:
+                with contextlib.suppress(OSError):  # no file, or of another user
+                    file.unlink()
+
+    def forget(self, since: float) -> None:
+        """Remove what was kept or used since a time (s, of the clock)."""
+        for found, file in self._entries():
+            if found.st_mtime >= since:
+                with contextlib.suppress(OSError):
+                    file.unlink()
+
+    def _entries(self) -> Iterator[tuple[os.stat_result, Path]]:
+        """What lies in the folder, whatever it is, but for what another build just removed."""
+        for file in self.folder.glob(f"{PREFIX}*") if self.folder else ():
+            with contextlib.suppress(OSError):
+                yield file.lstat(), file
 
 
 STORE: ContextVar[Store | None] = ContextVar("STORE", default=None)
@@ -228,6 +240,13 @@ def _worked_out_later(kind: type) -> frozenset[str]:
         return frozenset()
     each = (vars(one).items() for one in kind.__mro__)
     return frozenset(n for items in each for n, one in items if isinstance(one, cached_property))
+
+
+def _is_own_file(file: Path) -> bool:
+    """Whether it is a file, no link or pipe, and no other user's: entries are read by pickle."""
+    found = file.lstat()
+    own = not hasattr(os, "getuid") or found.st_uid == os.getuid()
+    return own and stat.S_ISREG(found.st_mode)
 
 
 def _digest(key: str, data: bytes) -> bytes:
