@@ -46,7 +46,9 @@ def true_machine(rig: Rig) -> Machine:
         leds=rig.leds,
         turn=turn.as_rotvec(),
         shift=np.zeros((len(rig.angle), 3)),
-        sag=np.stack([give[f].inv().apply(rig.sag[f]) for f in frames]),
+        sag=np.stack([give[f].inv().apply(rig.sag[f]) for f in frames])
+        + np.cross(rig.seat_turn, rig.centre - rig.body),
+        seat_turn=rig.seat_turn,
         forms=Forms(rig.terms, rig.across, rig.half),
     )
     first = 0 * np.arange(len(rig.angle))

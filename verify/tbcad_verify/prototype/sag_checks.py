@@ -28,7 +28,6 @@ CHECKS = {
 LEFT_MM = 0.1  # half of a pixel of the light field at the object, by which a ray may be off
 # Printed moduli are known to a quarter; two models of one part differ by a tenth to a quarter.
 OFF_PERCENT = 40.0
-TURNED_OFF_PERCENT = 40.0
 # Of a ball from its mirrors' places: 1.4 mm at the most cost the default prototype 0.8 mm of its
 # coverage. A modulus is known to a quarter, of that 0.35 mm.
 BESIDE_MM = 0.4
@@ -85,7 +84,7 @@ def _turned(
     stop, ball = np.unravel_index(apart.argmax(), apart.shape)
     off = 100 * float(np.linalg.norm(by_file - by_bricks) / np.linalg.norm(by_bricks))
     detail = f"ball {ball + 1} at stop {stop + 1} by {1000 * apart[stop, ball]:.2g} mrad"
-    return at_most(name, off, TURNED_OFF_PERCENT, detail)
+    return at_most(name, off, OFF_PERCENT, detail)
 
 
 def _mean(context: PrototypeContext, moved: Floats) -> Floats:
