@@ -1,6 +1,6 @@
 """The light of the LEDs in the balls, point by point: once reflected, and twice."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 

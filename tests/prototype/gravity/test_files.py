@@ -24,7 +24,9 @@ def written(folder: Path, plan: Plan) -> Sag:
     """The sag of a plan's balls in a folder of its prototype, by random displacements."""
     shape, random = (len(plan.angle), len(plan), 3), np.random.default_rng(1)
     of = {part: random.standard_normal(shape) for part in PARTS}
-    made = Sag(plan.angle, plan.body_centre @ plan.frame.T, plan.frame, of, random.standard_normal(shape))
+    made = Sag(
+        plan.angle, plan.body_centre @ plan.frame.T, plan.frame, of, random.standard_normal(shape)
+    )
     write_stops(folder, np.degrees(plan.angle).tolist(), [0.0] * len(plan.angle))
     write_table(folder / SagRow.FILE, SagRow.columns(), list(made.rows()))
     return made

@@ -78,7 +78,9 @@ def gravity_at(plan: Plan) -> Gravity:
     down = np.stack([np.cos(plan.angle), np.sin(plan.angle)])
     bends = np.random.default_rng(1).normal(0, 0.2, (2, 2, len(plan), 3))
     sag = np.einsum("wt,pwkx->ptkx", down, bends)
-    turn = np.einsum("wt,pwkx->ptkx", down, 0.025 * np.random.default_rng(3).permuted(bends, axis=2))
+    turn = np.einsum(
+        "wt,pwkx->ptkx", down, 0.025 * np.random.default_rng(3).permuted(bends, axis=2)
+    )
     return Gravity(4e-3 * np.sin(plan.angle), sag, turn, sag.sum(axis=0).mean(axis=0))
 
 

@@ -77,9 +77,7 @@ def _turned(
     name: CheckName, places: Floats, told: tuple[Floats, Floats], own: tuple[Floats, Floats]
 ) -> Check:
     """How far turns (S, K, 3) beside the best motion of displacements (S, K, 3) differ."""
-    by_file, by_bricks = (
-        turn - motions(moved, places)[:, None, 3:] for moved, turn in (told, own)
-    )
+    by_file, by_bricks = (turn - motions(moved, places)[:, None, 3:] for moved, turn in (told, own))
     apart = np.linalg.norm(by_file - by_bricks, axis=2)
     stop, ball = np.unravel_index(apart.argmax(), apart.shape)
     off = 100 * float(np.linalg.norm(by_file - by_bricks) / np.linalg.norm(by_bricks))

@@ -209,9 +209,7 @@ class Prior:
             turn=_sum(mean.turn, x[Block.TURN] @ self.across),
             shift=_sum(mean.shift, x[Block.SHIFT] @ self.ways),
             sag=None if mean.sag is None else (1 + x[Block.SAG][0]) * mean.sag,
-            seat_turn=(
-                None if mean.seat_turn is None else (1 + x[Block.SAG][0]) * mean.seat_turn
-            ),
+            seat_turn=(None if mean.seat_turn is None else (1 + x[Block.SAG][0]) * mean.seat_turn),
             forms=forms,
         )
 
