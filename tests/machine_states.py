@@ -15,7 +15,7 @@ from tbcad.rig.machine.machine import Machine
 
 # Standard deviations, about those of tbcad/tolerancing/process/fdm.toml.
 SEAT_MM, RADIUS_MM, CAMERA_MM, RUNOUT_MM = 0.15, 0.005, 0.14, 0.05
-SAG_MM = 0.1
+SAG_MM, SEAT_RAD = 0.1, 1e-3
 CAMERA_RAD, AXIS_RAD, ANGLE_RAD = 2.4e-3, 1.5e-3, 0.5e-3
 
 
@@ -57,4 +57,5 @@ def perturbed(machine: Machine, seed: int) -> Machine:
         shift=rng.normal(0, RUNOUT_MM, (f, 3)),
         turn=rng.normal(0, ANGLE_RAD, (f, 3)),
         sag=rng.normal(0, SAG_MM, (f, k, 3)),
+        seat_turn=rng.normal(0, SEAT_RAD, (f, k, 3)),
     )

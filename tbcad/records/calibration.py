@@ -67,7 +67,8 @@ class MachineRecord(Document):
         angle_deg: of the base, and
         turn_rad: of the base beside its angle, a rotation vector about the origin, and then
         shift_mm: of the base; None: none.
-        sag_mm: of each sphere by its weight, in the base's frame.
+        sag_mm: of each sphere by its weight, in the base's frame, and
+        seat_turn_rad: of its seat there, which turns a cap's form.
         leds_mm: places that the LEDs shine from.
         forms: of the fronts of caps; None: all are spheres.
     """
@@ -84,16 +85,19 @@ class MachineRecord(Document):
     turn_rad: tuple[Vector, ...] | None = None
     shift_mm: tuple[Vector, ...] | None = None
     sag_mm: tuple[tuple[Vector, ...], ...] | None = None
+    seat_turn_rad: tuple[tuple[Vector, ...], ...] | None = None
     forms: tuple[FormRecord, ...] | None = None
 
     @model_validator(mode="after")
     def _of_each_frame(self) -> Self:
         counted = {"angles": self.angle_deg, "turns": self.turn_rad, "shifts": self.shift_mm}
-        for what, values in (counted | {"sags": self.sag_mm}).items():
+        of_spheres = {"sags": self.sag_mm, "turns of seats": self.seat_turn_rad}
+        for what, values in (counted | of_spheres).items():
             if values is not None and len(values) != len(self.frames):
                 raise ValueError(f"another number of {what} than frames")
-        if any(len(row) != len(self.spheres) for row in self.sag_mm or ()):
-            raise ValueError("another number of sags than spheres in a frame")
+        for what, rows in of_spheres.items():
+            if any(len(row) != len(self.spheres) for row in rows or ()):
+                raise ValueError(f"another number of {what} than spheres in a frame")
         if any(one.ball > len(self.spheres) for one in self.forms or ()):
             raise ValueError("a form of a sphere that is not there")
         return self

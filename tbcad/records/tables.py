@@ -161,7 +161,8 @@ class StopRow(TableRow):
 class SagRow(TableRow):
     """By how much a ball's weight and that of the base move it at a stop, by what bends, mm.
 
-    In the frame of the shell; zero is where the design has it.
+    In the frame of the shell; zero is where the design has it. The carrier also turns each seat
+    its own way, as a rotation vector says; the other parts turn the base as a whole.
     """
 
     FILE: ClassVar[str] = "sag.csv"
@@ -183,6 +184,9 @@ class SagRow(TableRow):
     uprights_x_mm: Finite
     uprights_y_mm: Finite
     uprights_z_mm: Finite
+    carrier_turn_x_rad: Finite
+    carrier_turn_y_rad: Finite
+    carrier_turn_z_rad: Finite
 
 
 class WiringRow(TableRow):

@@ -46,7 +46,15 @@ def true_machine(rig: Rig) -> Machine:
         leds=rig.leds,
         turn=turn.as_rotvec(),
         shift=np.zeros((len(rig.angle), 3)),
-        sag=np.stack([give[f].inv().apply(rig.sag[f]) for f in frames]),
+        sag=np.stack(
+            [
+                give[f].inv().apply(rig.sag[f])
+                + Rotation.from_rotvec(rig.seat_turn[f]).apply(rig.centre - rig.body)
+                - (rig.centre - rig.body)
+                for f in frames
+            ]
+        ),
+        seat_turn=rig.seat_turn,
         forms=Forms(rig.terms, rig.across, rig.half),
     )
     first = 0 * np.arange(len(rig.angle))

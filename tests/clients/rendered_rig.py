@@ -46,6 +46,7 @@ class Rig:
     # beside that, (f, 6) and (f, k, 3)
     give: np.ndarray
     sag: np.ndarray
+    seat_turn: np.ndarray  # rotation vectors of the seats beside that, (f, k, 3)
     half: np.ndarray  # half width of the part of a cap in use, 0 of balls, (k,)
     terms: np.ndarray  # (k, 7)
     across: np.ndarray  # x and y of the forms, (k, 2, 3)
@@ -54,15 +55,17 @@ class Rig:
     def placed(self, frame: int, points: np.ndarray) -> np.ndarray:
         """Points of the base (k, 3), one of each sphere, where they are in a frame."""
         about = Rotation.from_rotvec(self.angle[frame] * self.axis)
+        points = self.body + Rotation.from_rotvec(self.seat_turn[frame]).apply(points - self.body)
         bent = Rotation.from_rotvec(self.give[frame, 3:]).apply(points) + self.give[frame, :3]
         moved = self.point + about.apply(bent + self.sag[frame] - self.point)
         return Rotation.from_rotvec(self.turn[frame]).apply(moved) + self.shift[frame]
 
     def attitude(self, frame: int) -> Rotation:
-        """Of the base in a frame."""
+        """Of the seats in a frame."""
         about = Rotation.from_rotvec(self.angle[frame] * self.axis)
         give = Rotation.from_rotvec(self.give[frame, 3:])
-        return Rotation.from_rotvec(self.turn[frame]) * about * give
+        seats = Rotation.from_rotvec(self.seat_turn[frame])
+        return Rotation.from_rotvec(self.turn[frame]) * about * give * seats
 
 
 def rows(path: Path) -> list[dict[str, str]]:
@@ -86,7 +89,7 @@ def frame_axes(normal: np.ndarray) -> np.ndarray:
 
 def designed(build: Path, frames: list[tuple[int, int]]) -> tuple[Rig, np.ndarray, np.ndarray]:
     """The rig of a build in frames (turn of the object, stop), what weight does there by each of
-    PARTS, (4, f, k, 3), and the turn by which motor and belt give, (f,)."""
+    PARTS and to seats (radians), (5, f, k, 3), and the turn by which motor and belt give, (f,)."""
     design = json.loads((build / "design.json").read_text())["cameras"][0]
     record = json.loads((build / "prototype.json").read_text())
     balls, stops, weight = (rows(build / f"{one}.csv") for one in ("balls", "stops", "sag"))
@@ -96,8 +99,9 @@ def designed(build: Path, frames: list[tuple[int, int]]) -> tuple[Rig, np.ndarra
     base = np.array([record["frame"][one] for one in ("axis", "zero", "third")])
     stop = np.array([stop - 1 for _, stop in frames])
     angle = np.radians(numbers(stops, "base_angle_deg")[:, 0])
-    bent = np.stack([numbers(weight, " ".join(f"{p}_{x}_mm" for x in "xyz")) for p in PARTS])
-    bent = bent.reshape(len(PARTS), len(stops), len(balls), 3)
+    names = [*(f"{part}_{{}}_mm" for part in PARTS), "carrier_turn_{}_rad"]
+    bent = np.stack([numbers(weight, " ".join(map(name.format, "xyz"))) for name in names])
+    bent = bent.reshape(len(names), len(stops), len(balls), 3)
     for one, turned in enumerate(angle):  # the table is in the frame of the design
         back = Rotation.from_rotvec(-turned * base[0]).as_matrix()
         bent[:, one] = bent[:, one] @ back.T
@@ -124,6 +128,7 @@ def designed(build: Path, frames: list[tuple[int, int]]) -> tuple[Rig, np.ndarra
         body_radius=numbers(balls, "body_radius_mm")[:, 0],
         give=np.zeros((len(frames), 6)),
         sag=np.zeros((len(frames), len(balls), 3)),
+        seat_turn=np.zeros((len(frames), len(balls), 3)),
         half=half,
         terms=np.zeros((len(balls), TERMS)),
         across=frame_axes(numbers(balls, "nx ny nz")),
@@ -159,7 +164,9 @@ def built(build: Path, frames: list[tuple[int, int]], seed: int) -> Rig:
     moved = common + (growth - 1) * rig.body + SEAT * normal((count, 3))
     tilt = Rotation.from_rotvec(1.8e-3 * normal(2) @ across)
     share = 1 + 0.25 * normal(len(PARTS))  # each part bends by its own
-    give, sag = motion_and_rest(rig.body, np.tensordot(share, bent, 1))
+    give, sag = motion_and_rest(rig.body, np.tensordot(share, bent[:-1], 1))
+    of_carrier = motion_and_rest(rig.body, bent[0])[0]
+    seat_turn = share[0] * (bent[-1] - of_carrier[:, None, 3:])
     turn = 2.8e-4 * normal((every, 2)) @ across
     run_out = 0.01 * normal((every, 2)) @ across
     offset = np.radians(random.uniform(-zero_error, zero_error, 2))
@@ -187,6 +194,7 @@ def built(build: Path, frames: list[tuple[int, int]], seed: int) -> Rig:
         body_radius=rig.body_radius + np.where(cap, 0.0, high),
         give=give,
         sag=sag,
+        seat_turn=seat_turn,
         terms=forms * normal((count, TERMS)) * cap[:, None],
         across=np.stack([(tilt * tilted).apply(rig.across[:, i]) for i in (0, 1)], axis=1),
         leds=rig.leds + SHIFT * normal(3) + LED * normal(rig.leds.shape),

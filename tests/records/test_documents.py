@@ -42,6 +42,7 @@ DOCUMENTS: dict[type[Document], dict[str, Any]] = {
         **{"frames": FRAMES, "angle_deg": [0.1 + 0.2, 1e-17, -3.0, 4.0]},
         "spheres": [{"centre_mm": [1.0, 2.0, 3.0], "radius_mm": 4.0}],
         **{"leds_mm": [], "turn_rad": None, "shift_mm": None, "sag_mm": None},
+        "seat_turn_rad": None,
         "forms": None,
     },
 }

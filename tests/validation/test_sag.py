@@ -42,12 +42,16 @@ HELD = Axle(-40 * X, -3 * X, 2 * SIDE)
 def test_a_bar_bends_under_its_weight_and_a_load_as_a_beam_does() -> None:
     load = 500.0
     bodies = Bodies(np.array([[LENGTH - 10, 0.7, -1.3]]), np.array([15.0]), np.array([load]))
-    moved = sag_of_bodies(bar(), bodies, HELD, SOLID)[0]
+    moved, turned = np.split(sag_of_bodies(bar(), bodies, HELD, SOLID)[0], 2)
     a, whole, each = LENGTH - 10 - START, LENGTH - START, SOLID.density * 1e-3 * SIDE**2 * N_PER_G
     own = each * a**2 * (6 * whole**2 - 4 * whole * a + a**2) / 24 / (2000 * INERTIA)
     tip = load * N_PER_G * (a**3 / 3 / (2000 * INERTIA) + a / SHEAR)
     assert np.diag(moved)[1:] == pytest.approx([own + tip] * 2, rel=0.02)
     assert abs(moved - np.diag(np.diag(moved))).max() < 0.02 * (own + tip)
+    # The slope there: of its own weight, and of the load.
+    slope = each * a * (3 * whole**2 - 3 * whole * a + a**2) / 6 / (2000 * INERTIA)
+    slope += load * N_PER_G * a**2 / 2 / (2000 * INERTIA)
+    assert [turned[2, 1], -turned[1, 2]] == pytest.approx([slope] * 2, rel=0.02)
 
 
 def test_the_tip_of_a_bar_has_the_compliance_of_a_column() -> None:

@@ -44,9 +44,9 @@ class Axle:
 
 @kept("weight")
 def sag_of_bodies(part: Trimesh, bodies: Bodies, axle: Axle, material: Material) -> Floats:
-    """Displacements of bodies' centres under one g along each axis, mm, (k, 3, 3).
+    """Displacements of bodies' centres, mm, then small turns of their seats, radians, (k, 6, 3).
 
-    The last axis is that of gravity; the part is held on the axle.
+    Under one g along each axis, which is the last; the part is held on the axle.
     """
     cells = fill_cells(part, CELL_MM, material.infill)
     elastic = hold(cells, _near_axle(cells, axle))
@@ -56,7 +56,7 @@ def sag_of_bodies(part: Trimesh, bodies: Bodies, axle: Axle, material: Material)
     for (nodes, fit), mass in zip(seats, bodies.mass, strict=True):
         load[nodes] += fit[:3].transpose(1, 2, 0) * mass * N_PER_G
     moved = elastic.solve(load) / (material.modulus * 1e3)
-    return np.stack([np.einsum("anb,nbg->ag", fit[:3], moved[nodes]) for nodes, fit in seats])
+    return np.stack([np.einsum("anb,nbg->ag", fit, moved[nodes]) for nodes, fit in seats])
 
 
 @kept("weight")

@@ -32,6 +32,7 @@ class Sag:
     centre: Floats  # of the bodies as designed, in the base's frame, mm, (k, 3)
     axes: Floats  # of that frame at angle zero in the shell's, as rows, (3, 3)
     of: dict[str, Floats]  # by what bends, one of PARTS, (s, k, 3)
+    seat_turn: Floats  # small rotations of the seats as the carrier bends, radians, (s, k, 3)
 
     @property
     def gravity(self) -> Floats:
@@ -88,8 +89,9 @@ class Sag:
         ]
 
     def rows(self) -> Iterable[Row]:
-        """Rows of sag.csv: displacements in the frame of the shell."""
-        turned = [rotated_about_x(self.of[part], self.angle[:, None]) for part in PARTS]
+        """Rows of sag.csv: displacements and turns in the frame of the shell."""
+        vectors = (*(self.of[part] for part in PARTS), self.seat_turn)
+        turned = [rotated_about_x(one, self.angle[:, None]) for one in vectors]
         moved = np.concatenate([one @ self.axes for one in turned], axis=2)
         for stop, balls in enumerate((moved + 0.0).tolist(), 1):
             for ball, cells in enumerate(balls, 1):
@@ -114,10 +116,10 @@ def read_sag(folder: Path) -> Sag | None:
     angle = np.radians([row.base_angle_deg for row in stops])
     axes = np.array([record.frame.axis, record.frame.zero, record.frame.third])
     moved = np.array([[getattr(row, one) for one in SagRow.columns()[2:]] for row in rows])
-    parts = moved.reshape(*shape, len(PARTS), 3).transpose(2, 0, 1, 3) @ axes.T
-    turned = rotated_about_x(parts, -angle[:, None])
+    vectors = moved.reshape(*shape, len(PARTS) + 1, 3).transpose(2, 0, 1, 3) @ axes.T
+    *turned, seat_turn = rotated_about_x(vectors, -angle[:, None])
     centre = (columns(balls, "bx by bz") + columns(balls, SAG)) @ axes.T
-    return Sag(angle, centre, axes, dict(zip(PARTS, turned, strict=True)))
+    return Sag(angle, centre, axes, dict(zip(PARTS, turned, strict=True)), seat_turn)
 
 
 def write_sag(folder: Path, sag: Sag) -> None:

@@ -108,12 +108,13 @@ def sag_of(base: WeighedBase) -> Sag:
     carrier, shaft = base.solids[CARRIER], base.solids[SHAFT]
     held = Axle(X * carrier.bounds[0, 0], X * shaft.bounds[1, 0], _shaft_radius(base.solids))
     moved = sag_of_bodies(carrier, base.bodies, held, base.material)
-    sag = Sag(base.angle, base.bodies.centre, base.axes, {})
-    of = {CARRIER: np.einsum("kag,sg->ska", moved, sag.gravity)}
+    sag = Sag(base.angle, base.bodies.centre, base.axes, {}, np.empty(0))
+    of_carrier = np.einsum("kag,sg->ska", moved, sag.gravity)
+    of = {CARRIER: of_carrier[..., :3]}
     turns = base.angle, -base.axes[:, 2]
     for name, flexible in _holding(base, held.start).items():
         of[name] = moved_by(flexible, held.start, base.bodies.centre, base.load, turns)
-    return Sag(base.angle, base.bodies.centre, base.axes, of)
+    return replace(sag, of=of, seat_turn=of_carrier[..., 3:])
 
 
 def _shaft_radius(solids: dict[str, Trimesh]) -> float:

@@ -65,9 +65,13 @@ class Setup:
         known = (self.export.folder / StopRow.FILE).is_file()  # not of exports by old versions
         gravity = read_gravity(self.export, self.plan) if known else weightless(self.plan)
         turned = replace(self.designed, angle=self.designed.angle + gravity.wind_up[stop])
+        placed = replace(turned, centre=self.plan.centre)
         return prototype_prior(
             turned,
-            [sag_motion(turned, self.plan.body_centre, one[stop]) for one in gravity.sag],
+            [
+                sag_motion(placed, self.plan.body_centre, sag[stop], turn[stop])
+                for sag, turn in zip(gravity.sag, gravity.turn, strict=True)
+            ],
             errors,
             np.where(
                 is_cap(self.plan)[:, None], self.plan.body_centre - self.plan.sag, turned.centre

@@ -85,6 +85,7 @@ def prototype_prior(
         turn=share * np.sum([one.turn for one in moved], axis=0),
         shift=share * np.sum([one.shift for one in moved], axis=0),
         sag=share * np.sum([one.sag for one in moved], axis=0),
+        seat_turn=share * np.sum([one.seat_turn for one in moved], axis=0),
     )
     return prior_of(mean, series, known, seat)
 

@@ -148,14 +148,14 @@ def _balls(plan: Plan, machine: Machine, frames: tuple[Frame, ...], turn: int) -
             every[name][at] = values[number]
     there = replace(machine, **every)
     stop = np.repeat(np.arange(stops), len(plan))
+    ball = np.tile(np.arange(len(plan)), stops)
 
     def place(points: Floats) -> Floats:
-        on_base = points if there.sag is None else points + there.sag
-        return there.placed(on_base.reshape(-1, 3), stop).reshape(points.shape)
+        return there.on_spheres(points.reshape(-1, 3), stop, ball).reshape(points.shape)
 
     if there.forms is None:
         return balls_at_stops(plan, machine.centre, machine.radius, place)
-    forms = there.forms_in(stop, np.tile(np.arange(len(plan)), stops)).reshape(stops, len(plan), -1)
+    forms = there.forms_in(stop, ball).reshape(stops, len(plan), -1)
     return balls_at_stops(plan, machine.centre, machine.radius, place, forms, there.forms.outward)
 
 
@@ -190,22 +190,28 @@ class Motion:
     angle: Floats  # further about the axis, radians, (f,)
     turn: Floats  # radians, (f, 3)
     shift: Floats  # mm, (f, 3)
-    sag: Floats  # mm, (f, k, 3)
+    sag: Floats  # of the reflecting spheres, mm, (f, k, 3)
+    seat_turn: Floats  # radians, (f, k, 3)
 
 
-def sag_motion(machine: Machine, body: Floats, sag: Floats) -> Motion:
+def sag_motion(
+    machine: Machine, body: Floats, sag: Floats, seat_turn: Floats | None = None
+) -> Motion:
     """Displacements of bodies in the base's frame, mm, (f, k, 3), as the best motion and the rest.
 
     To first order, for an axis through the origin. Bodies are at (k, 3), mm: the centre of a flat
-    cap's sphere is metres behind its body, and moves with the turn as far as its arm is long.
+    cap's sphere is metres behind its body, and moves with the turn of its seat, (f, k, 3) radians,
+    as far as its arm is long. None: all seats turn as the best motion does.
     """
     fitted = best_motions(body, sag)
+    own = 0 * sag if seat_turn is None else seat_turn - fitted[:, None, 3:]
     rest = sag - fitted[:, None, :3] - np.cross(fitted[:, None, 3:], body)
+    rest = rest + np.cross(own, machine.centre - body)
     shift, turn = (
         rotated(one, machine.axis, machine.angle) for one in (fitted[:, :3], fitted[:, 3:])
     )
     angle = turn @ machine.axis
-    return Motion(angle, turn - angle[:, None] * machine.axis, shift, rest)
+    return Motion(angle, turn - angle[:, None] * machine.axis, shift, rest, own)
 
 
 def random_build(
@@ -213,9 +219,10 @@ def random_build(
 ) -> BuiltPrototype:
     """The first simulated build, the same that `tbcad tolerance` has, with a real lens and LEDs."""
     draws = draw_prototypes(errors, seed, [0], is_cap(plan), gravity)
-    moved = sag_motion(
-        designed, plan.body_centre, np.tile(gravity.sagged(draws.sag[0]), (RUNS, 1, 1))
+    by_weight = (
+        np.tile(one(draws.sag[0]), (RUNS, 1, 1)) for one in (gravity.sagged, gravity.turned)
     )
+    moved = sag_motion(designed, plan.body_centre, *by_weight)
     across = plan.frame[1:]
     other = draw_other_errors(len(designed.leds), seed)
     tilt = Rotation.from_rotvec(draws.tilt[0] @ across)
@@ -236,6 +243,7 @@ def random_build(
         turn=moved.turn + (draws.wobble[0] @ across).reshape(-1, 3),
         shift=moved.shift + (draws.runout[0] @ across).reshape(-1, 3),
         sag=moved.sag,
+        seat_turn=moved.seat_turn,
         forms=forms,
     )
     # A ball is its own body, too large or too small as it is.

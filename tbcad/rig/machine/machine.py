@@ -42,7 +42,10 @@ CAMERA = {
     **{"principal": "principal_px", "distortion": "distortion"},
 }
 """Arrays of a camera, and their keys in machine.json."""
-OF_FRAMES = {"turn": "turn_rad", "shift": "shift_mm", "sag": "sag_mm"}
+OF_FRAMES = {
+    **{"turn": "turn_rad", "shift": "shift_mm"},
+    **{"sag": "sag_mm", "seat_turn": "seat_turn_rad"},
+}
 """Arrays of a machine's frames that it may lack, and their keys there."""
 ROUNDING = 1e-9  # of unit vectors
 MICROMETRE = 1e-3  # mm
@@ -66,12 +69,20 @@ class Machine:
     shift: Floats | None = None
     # of the spheres in each frame by their weight, in the base's frame, mm, (f, k, 3)
     sag: Floats | None = None
+    # of their seats then, beside the base's turn, with which forms go: rotation vectors in the
+    # base's frame, radians, (f, k, 3); that it moves a cap's sphere is in its sag
+    seat_turn: Floats | None = None
     # form errors of the spheres, of which caps have some; None: none
     forms: Forms | None = None
 
     def centres(self, frame: Ints, sphere: Ints) -> Floats:
         """Centres of spheres (n,) in frames (n,), mm, (n, 3)."""
-        on_base = self.centre[sphere]
+        return self.on_spheres(self.centre[sphere], frame, sphere)
+
+    def on_spheres(self, points: Floats, frame: Ints, sphere: Ints) -> Floats:
+        """Where points (n, 3) of spheres' bodies on the base are in frames (n,), mm, (n, 3)."""
+        centre = self.centre[sphere]
+        on_base = centre + self.seat_turns(frame, sphere).apply(points - centre)
         if self.sag is not None:
             on_base = on_base + self.sag[frame, sphere]
         return self.placed(on_base, frame)
@@ -93,10 +104,17 @@ class Machine:
     def forms_in(self, frame: Ints, sphere: Ints) -> Floats:
         """Forms of spheres (n,) in frames (n,), (n, FORM_COLUMNS); they have to be known."""
         assert self.forms is not None
-        rows = self.forms.rows()[sphere]
+        rows, seats = self.forms.rows()[sphere], self.seat_turns(frame, sphere)
         for start in range(FIRST, PER_MM, 3):
-            rows[:, start : start + 3] = self.turned(rows[:, start : start + 3], frame)
+            rows[:, start : start + 3] = self.turned(seats.apply(rows[:, start : start + 3]), frame)
         return rows
+
+    def seat_turns(self, frame: Ints, sphere: Ints) -> Rotation:
+        """Of the seats of spheres (n,) on the base in frames (n,)."""
+        none = np.zeros((len(frame), 3))
+        return Rotation.from_rotvec(
+            none if self.seat_turn is None else self.seat_turn[frame, sphere]
+        )
 
     def reflecting_centres(self, frame: Ints, sphere: Ints, light: Floats) -> Floats:
         """Centres (n, 3) of spheres that show lights (n, 3) where those with their forms do, mm."""

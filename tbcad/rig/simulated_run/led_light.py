@@ -1,6 +1,6 @@
 """The light of the LEDs in the balls, point by point: once reflected, and twice."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -99,7 +99,7 @@ def balls_of_frame(built: BuiltPrototype, frame: int) -> Floats:
     machine = built.machine
     spheres = np.arange(len(machine.radius))
     frames = np.full(len(spheres), frame)
-    bodies = replace(machine, centre=built.body_centre).centres(frames, spheres)
+    bodies = machine.on_spheres(built.body_centre, frames, spheres)
     forms = [] if machine.forms is None else [machine.forms_in(frames, spheres)]
     return np.column_stack(
         [machine.centres(frames, spheres), machine.radius, bodies, built.body_radius, *forms]

@@ -22,8 +22,7 @@ class Gravity:
     # displacements of bodies in the base's frame at angle zero: as the carrier bends, and as what
     # holds its hub does, mm, (2, t, k, 3)
     sag: Floats
-    # small rotations of the base that these are the best fit of, and caps with their seats follow,
-    # radians, (2, t, 3)
+    # small rotations of the seats, which caps follow, radians, (2, t, k, 3)
     turn: Floats
     # on the mean over each ball's pictures: seats are made so much beside the places of their
     # balls, mm, (k, 3)
@@ -34,15 +33,15 @@ class Gravity:
         return np.tensordot(share, self.sag, axes=(-1, 0))
 
     def turned(self, share: Floats) -> Floats:
-        """Rotations with shares (..., 2) of both, radians, (..., t, 3)."""
+        """Rotations with shares (..., 2) of both, radians, (..., t, k, 3)."""
         return np.tensordot(share, self.turn, axes=(-1, 0))
 
 
 def weightless(plan: Plan) -> Gravity:
     """Without gravity, and with seats where the balls are to be."""
     stops, balls = len(plan.angle), len(plan)
-    sag, turn = np.zeros((2, stops, balls, 3)), np.zeros((2, stops, 3))
-    return Gravity(np.zeros(stops), sag, turn, np.zeros((balls, 3)))
+    none = np.zeros((2, stops, balls, 3))
+    return Gravity(np.zeros(stops), none, none, np.zeros((balls, 3)))
 
 
 def read_gravity(export: ExportedDesign, plan: Plan) -> Gravity:
@@ -69,5 +68,6 @@ def read_gravity(export: ExportedDesign, plan: Plan) -> Gravity:
         return replace(none, wind_up=wind_up)
     carrier = found.of["carrier"]
     sag = np.stack([carrier, found.whole - carrier]) @ found.axes
-    turn = np.stack([best_motions(plan.body_centre, one)[:, 3:] for one in sag])
+    as_one = best_motions(plan.body_centre, sag[1])[:, None, 3:]
+    turn = np.stack([found.seat_turn @ found.axes, np.broadcast_to(as_one, carrier.shape)])
     return Gravity(wind_up, sag, turn, plan.sag)

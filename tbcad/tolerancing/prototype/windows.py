@@ -254,7 +254,7 @@ def run_pose(model: PrototypeWindows, draws: PrototypeDraws, build: int, half: i
     run, plan = model.runs[half], model.plan
     powered = powered_plan(plan, draws.power[build])
     arm = (tilted_centres(powered, draws.cap_tilt[build]) - plan.body_centre)[run.ball]
-    by_weight = Rotation.from_rotvec(model.gravity.turned(draws.sag[build])[run.stop])
+    by_weight = Rotation.from_rotvec(model.gravity.turned(draws.sag[build])[run.stop, run.ball])
     seat = (plan.body_centre + draws.seat[build])[run.ball]
     seat = seat + model.gravity.sagged(draws.sag[build])[run.stop, run.ball]
     caps = cap_rotations(plan, draws.cap_tilt[build])[run.ball]

@@ -44,7 +44,7 @@ def test_calibration_takes_out_the_motions_that_it_has() -> None:
     random = np.random.default_rng(6)
     rigid = np.einsum("kij,sj->ski", rigid_motion(CENTRE), random.standard_normal((5, 6)))
     lasting = random.standard_normal((6, 3))
-    sag = Sag(ANGLE, CENTRE, np.eye(3), {"carrier": rigid + lasting})
+    sag = Sag(ANGLE, CENTRE, np.eye(3), {"carrier": rigid + lasting}, NONE)
     assert sag.unmodelled(sag.whole, LEFT["six freedoms"]).max() == pytest.approx(0, abs=1e-12)
     assert sag.unmodelled(sag.whole, LEFT["turn and run-out"]).max() > 0.1
 
@@ -52,7 +52,7 @@ def test_calibration_takes_out_the_motions_that_it_has() -> None:
 def test_the_longest_way_is_between_two_stops_of_one_ball() -> None:
     moved = NONE.copy()
     moved[1, 2], moved[4, 2], moved[3, 5] = [3, 0, 0], [0, 4, 0], [0, 0, 4.5]
-    sag = Sag(ANGLE, CENTRE, np.eye(3), {"carrier": moved, "shaft": NONE})
+    sag = Sag(ANGLE, CENTRE, np.eye(3), {"carrier": moved, "shaft": NONE}, NONE)
     assert sag.record()["between_stops_mm"] == pytest.approx(5.0)
     assert sag.record()["parts_between_stops_mm"]["shaft"] == 0
     assert "up to 5.00 mm" in sag.lines()[0]

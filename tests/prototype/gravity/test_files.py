@@ -24,7 +24,9 @@ def written(folder: Path, plan: Plan) -> Sag:
     """The sag of a plan's balls in a folder of its prototype, by random displacements."""
     shape, random = (len(plan.angle), len(plan), 3), np.random.default_rng(1)
     of = {part: random.standard_normal(shape) for part in PARTS}
-    made = Sag(plan.angle, plan.body_centre @ plan.frame.T, plan.frame, of)
+    made = Sag(
+        plan.angle, plan.body_centre @ plan.frame.T, plan.frame, of, random.standard_normal(shape)
+    )
     write_stops(folder, np.degrees(plan.angle).tolist(), [0.0] * len(plan.angle))
     write_table(folder / SagRow.FILE, SagRow.columns(), list(made.rows()))
     return made
@@ -35,6 +37,7 @@ def test_displacements_are_read_as_they_were_written(folder: Path, plan: Plan) -
     assert found is not None
     for part in PARTS:
         assert found.of[part] == pytest.approx(made.of[part], abs=1e-12)
+    assert found.seat_turn == pytest.approx(made.seat_turn, abs=1e-12)
     assert found.centre == pytest.approx(made.centre, abs=1e-9)
 
 

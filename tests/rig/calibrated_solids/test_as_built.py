@@ -119,7 +119,8 @@ class TestDeviations:
 def test_another_number_of_balls_is_refused(
     export: ExportedDesign, plan: Plan, built: Machine, tmp_path: Path
 ) -> None:
-    few = replace(built, centre=built.centre[1:], radius=built.radius[1:], sag=None)
+    few = replace(built, centre=built.centre[1:], radius=built.radius[1:])
+    few = replace(few, sag=None, seat_turn=None)
     with pytest.raises(InputError, match=r"has 4 balls, .* has 5"):
         as_built(known(tmp_path / "known", few, plan), export.folder, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -48,11 +48,11 @@ def small_prior(machine: Machine, process: str = "fdm") -> Prior:
     series = np.repeat([0, 1], len(machine.angle) // 2)
     down = np.stack([np.cos(machine.angle), np.sin(machine.angle)], axis=1)
     bends = np.random.default_rng(0).normal(0, 0.4, (2, len(arm), 3, 2))
-    moved = [
-        sag_motion(machine, machine.centre, np.einsum("kxa,fa->fkx", one, down)) for one in bends
-    ]
+    bent = np.einsum("pkxa,fa->pfkx", bends, down)
+    bodies = seats(machine, arm)
+    moved = [sag_motion(machine, bodies, one, 3e-3 * one[:, ::-1]) for one in bent]
     errors = process_errors(load_process(process))
-    return prototype_prior(machine, moved, errors, seats(machine, arm), series)
+    return prototype_prior(machine, moved, errors, bodies, series)
 
 
 def outward(machine: Machine) -> np.ndarray:

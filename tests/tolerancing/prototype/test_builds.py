@@ -78,7 +78,9 @@ def gravity_at(plan: Plan) -> Gravity:
     down = np.stack([np.cos(plan.angle), np.sin(plan.angle)])
     bends = np.random.default_rng(1).normal(0, 0.2, (2, 2, len(plan), 3))
     sag = np.einsum("wt,pwkx->ptkx", down, bends)
-    turn = np.einsum("wt,pwx->ptx", down, np.random.default_rng(3).normal(0, 5e-3, (2, 2, 3)))
+    turn = np.einsum(
+        "wt,pwkx->ptkx", down, 0.025 * np.random.default_rng(3).permuted(bends, axis=2)
+    )
     return Gravity(4e-3 * np.sin(plan.angle), sag, turn, sag.sum(axis=0).mean(axis=0))
 
 
@@ -158,7 +160,7 @@ def balls(
         wobble = Rotation.from_rotvec(draws.wobble[build, half, stop] @ frame[1:])
         about = wobble * tilt * Rotation.from_rotvec(angle * frame[0])
         carrier, rest = (draws.sag[build] * model.gravity.sag[:, stop, ball].T).T
-        bent = Rotation.from_rotvec(draws.sag[build] @ model.gravity.turn[:, stop])
+        bent = Rotation.from_rotvec(draws.sag[build] @ model.gravity.turn[:, stop, ball])
         place = about.apply(seat[ball] + carrier + rest + bent.apply(arm[ball]))
         centre[i] = place + drift[0] * frame[1] + drift[1] * frame[2]
     return centre, (model.plan.radius + draws.radius[build])[run.ball]
@@ -297,7 +299,7 @@ def test_seats_against_weight_bring_balls_to_their_places(
     sag = np.broadcast_to(mean / 2, (2, stops, len(plan), 3))
     results = []
     for seats in (mean, 0 * mean):
-        gravity = Gravity(np.zeros(stops), sag, np.zeros((2, stops, 3)), seats)
+        gravity = Gravity(np.zeros(stops), sag, 0 * sag, seats)
         model = prototype_model(reflectors(small_design), plan, gravity)
         draws = draws_of(model, 1, sag=Error(mean=1.0))
         results.append(prototype_result(model, draws).calibrated_coverage.min())

@@ -68,6 +68,23 @@ def half_the_carriers(rows: Rows) -> None:
         one.update({k: str(float(v) / 2) for k, v in one.items() if k.startswith("carrier")})
 
 
+def seats_turned(share: float) -> Callable[[Rows], None]:
+    """So much of the turns of seats."""
+
+    def how(rows: Rows) -> None:
+        for one in rows:
+            one.update({k: str(share * float(v)) for k, v in one.items() if k.endswith("_rad")})
+
+    return how
+
+
+def seats_of_others(rows: Rows) -> None:
+    """Turns of the next ball."""
+    others = [dict(one) for one in (*rows[1:], rows[0])]
+    for one, other in zip(rows, others, strict=True):
+        one.update({k: v for k, v in other.items() if k.endswith("_rad")})
+
+
 def more_of_the_shaft(rows: Rows) -> None:
     """All balls half a millimetre lower at all stops."""
     for one in rows:
@@ -440,6 +457,13 @@ FAILING: Broken = {
     ("sag as written", SAG): {
         "sag: half as much": (table(SAG, half_the_carriers), "root mean square"),
         "sag: bent below the hub": (row(SAG, 4, shaft_x_mm=0.5), "bend the base"),
+    },
+    ("turns as written", SAG): {
+        "sag: seats that do not turn": (table(SAG, seats_turned(0.0)), "mrad"),
+        "sag: half of the seats' turns": (table(SAG, seats_turned(0.5)), "mrad"),
+        "sag: seats turned the other way": (table(SAG, seats_turned(-1.0)), "mrad"),
+        "sag: turns in milliradians": (table(SAG, seats_turned(1e3)), "mrad"),
+        "sag: turns of other seats": (table(SAG, seats_of_others), "mrad"),
     },
     ("coverage, balls", SAG): {
         "sag: caps that turn too much": (swaying(0.2), "shows too little"),

@@ -200,8 +200,8 @@ def test_first_mirrors_by_brute_force(context: PrototypeContext, rays_together: 
 def hung(measured: MeasuredPrototype, moved: Floats) -> MeasuredPrototype:
     """The same with displacements (S, K, 3) by weight, in the ground's frame, mm."""
     stop, ball = np.indices(moved.shape[:2]).reshape(2, -1) + 1
-    columns = [moved[..., x].ravel() for x in range(3)] + [np.zeros(stop.size)] * 9
-    names = [name for name in SagTable.model_fields if name.endswith("_mm")]
+    columns = [moved[..., x].ravel() for x in range(3)] + [np.zeros(stop.size)] * 12
+    names = list(SagTable.model_fields)[2:]
     table = SagTable.model_construct(stop=stop, ball=ball, **dict(zip(names, columns, strict=True)))
     record = measured.context.prototype.model_copy(update={"sag": table})
     return replace(measured, context=replace(measured.context, prototype=record))

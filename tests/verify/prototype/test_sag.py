@@ -79,7 +79,7 @@ def test_motions_of_the_whole_base_are_taken_out() -> None:
 
 def test_a_table_of_other_stops_or_balls_is_not_used() -> None:
     pairs = {"stop": [*"1122"], "ball": [*"1212"]}
-    named = [name for name in SagTable.model_fields if name.endswith("_mm")]
+    named = list(SagTable.model_fields)[2:]
     table = SagTable.model_validate(pairs | {name: [*"0123"] for name in named})
     moved = table.moved((2, 2, 3))
     assert moved is not None

@@ -33,7 +33,7 @@ Row = dict[str, Any]
 
 # Checks that are unknown where a ball's stop is, and where its place is.
 ON_STOPS = ("cells", "coverage, balls", "light paths, balls", "rays, balls", "pixels, balls")
-SAG = "sag left", "sag as written", "balls under weight"
+SAG = "sag left", "sag as written", "balls under weight", "turns as written"
 ON_BALLS = (*ON_STOPS, "swing", "swing clearance", "balls apart", *SAG)
 
 

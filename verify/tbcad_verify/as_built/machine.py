@@ -111,6 +111,8 @@ class AsBuilt(Strict):
     shift: list[Vector] | None = Field(None, alias="shift_mm", max_length=MOST)
     # of each ball in each by its weight, in the base's frame, mm
     sag: list[list[Vector]] | None = Field(None, alias="sag_mm", max_length=MOST)
+    # of each ball's seat in each, with which its form turns: rotation vectors there, radians
+    seat_turn: list[list[Vector]] | None = Field(None, alias="seat_turn_rad", max_length=MOST)
     forms: list[MeasuredForm] | None = Field(None, max_length=MOST)  # of caps; None: spheres
     # reflecting spheres
     balls: list[MeasuredBall] = Field(alias="spheres", min_length=1, max_length=MOST)
@@ -119,11 +121,12 @@ class AsBuilt(Strict):
     def _consistent(self) -> Self:
         if abs(float(np.linalg.norm(self.axis)) - 1) > SQUARE:
             raise ValueError("has an axis of another length than 1")
-        given = [one for one in (self.turn, self.shift, self.sag) if one is not None]
+        of_balls = self.sag, self.seat_turn
+        given = [one for one in (self.turn, self.shift, *of_balls) if one is not None]
         if {len(self.angle_deg), *map(len, given)} != {len(self.frames)}:
             raise ValueError("has another number of angles, turns, shifts or sags than of frames")
-        if any(len(row) != len(self.balls) for row in self.sag or ()):
-            raise ValueError("has another number of sags than of spheres in a frame")
+        if any(len(row) != len(self.balls) for one in of_balls for row in one or ()):
+            raise ValueError("has another number of sags or turns than of spheres in a frame")
         formed = [one.ball for one in self.forms or ()]
         if len(set(formed)) != len(formed) or max(formed, default=0) > len(self.balls):
             raise ValueError("has two forms of a ball, or one of a ball that is not there")
@@ -163,7 +166,9 @@ class AsBuilt(Strict):
         for one in self.forms or ():
             k = one.ball - 1
             half[k], terms[:, k], axes[:, k] = one.half, np.array(one.terms_um) / 1000, one.axes
-        turn = self._turn(frame) * self._about_axis(frame)
+        none = np.zeros((frame.size, 3))
+        seat = none if self.seat_turn is None else np.array(self.seat_turn)[frame, ball]
+        turn = self._turn(frame) * self._about_axis(frame) * Rotation.from_rotvec(seat)
         across = np.stack([turn.apply(way[ball]).T for way in axes])
         return Fronts(placed, self.radius[ball], across, half[ball], terms[:, ball])
 

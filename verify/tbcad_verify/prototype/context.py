@@ -135,9 +135,17 @@ class PrototypeContext:
 
         Those of sag.csv, else the means. Unknown: they are of other stops or balls.
         """
-        sag, stops, balls = self.prototype.sag, self.prototype.stops, self.prototype.balls
-        if sag is None:
+        told, stops = self.told_sag, self.prototype.stops
+        if told is None:
             turns = self.base_rotation(np.radians(stops.angle)).as_matrix()
-            return np.asarray(balls.sag.T @ turns.swapaxes(1, 2))
-        moved = require(sag.moved((len(stops), len(balls), 3)), OTHER_SAG)
-        return np.asarray(moved.sum(axis=0))
+            return np.asarray(self.prototype.balls.sag.T @ turns.swapaxes(1, 2))
+        return np.asarray(told[:4].sum(axis=0))
+
+    @cached_property
+    def told_sag(self) -> Floats | None:
+        """(5, S, K, 3) of sag.csv, in the ground's frame: see `SagTable.moved`; None without it.
+
+        Unknown: it is of other stops or balls.
+        """
+        sag, shape = self.prototype.sag, (len(self.prototype.stops), len(self.prototype.balls), 3)
+        return None if sag is None else require(sag.moved(shape), OTHER_SAG)

@@ -21,7 +21,10 @@ from tbcad_verify.report.checks import Check, CheckName, at_most, require
 from tbcad_verify.types import Floats
 
 FILE = "sag.csv"
-CHECKS = {"sag left": "mm", "sag as written": "%", "balls under weight": "mm"}
+CHECKS = {
+    **{"sag left": "mm", "sag as written": "%", "balls under weight": "mm"},
+    "turns as written": "%",
+}
 LEFT_MM = 0.1  # half of a pixel of the light field at the object, by which a ray may be off
 # Printed moduli are known to a quarter; two models of one part differ by a tenth to a quarter.
 OFF_PERCENT = 40.0
@@ -50,9 +53,11 @@ def checks(
     table = require(context.prototype.sag, "the build has no sag.csv")
     turn = context.base_rotation(np.radians(context.prototype.stops.angle)).as_matrix()
     down = np.array([0.0, 0.0, -1.0]) @ turn
-    own = np.einsum("kab,sb->ska", _by_weight(context, parts, measured, drawn), down)
+    whole = np.einsum("kab,sb->ska", _by_weight(context, parts, measured, drawn), down)
+    own, turned = whole[..., :3], whole[..., 3:]
     told = require(table.moved(own.shape), OTHER_SAG)
-    told = np.einsum("sba,pskb->pska", turn, told)
+    *told, told_turn = np.einsum("sba,pskb->pska", turn, told)
+    told = np.array(told)
     left = np.linalg.norm(_without_motions(own - own.mean(axis=0), measured.body.T), axis=2)
     stop, ball = np.unravel_index(left.argmax(), left.shape)
     off = 100 * float(np.linalg.norm(told[0] - own) / np.linalg.norm(own))
@@ -64,7 +69,20 @@ def checks(
         at_most(names[0], float(left.max()), LEFT_MM, f"ball {ball + 1} at stop {stop + 1}"),
         at_most(names[1], off, OFF_PERCENT, detail),
         _beside(names[2], context, measured, _mean(context, own + told[1:].sum(axis=0)).T),
+        _turned(names[3], measured.body.T, (told[0], told_turn), (own, turned)),
     ]
+
+
+def _turned(
+    name: CheckName, places: Floats, told: tuple[Floats, Floats], own: tuple[Floats, Floats]
+) -> Check:
+    """How far turns (S, K, 3) beside the best motion of displacements (S, K, 3) differ."""
+    by_file, by_bricks = (turn - motions(moved, places)[:, None, 3:] for moved, turn in (told, own))
+    apart = np.linalg.norm(by_file - by_bricks, axis=2)
+    stop, ball = np.unravel_index(apart.argmax(), apart.shape)
+    off = 100 * float(np.linalg.norm(by_file - by_bricks) / np.linalg.norm(by_bricks))
+    detail = f"ball {ball + 1} at stop {stop + 1} by {1000 * apart[stop, ball]:.2g} mrad"
+    return at_most(name, off, OFF_PERCENT, detail)
 
 
 def _mean(context: PrototypeContext, moved: Floats) -> Floats:
@@ -93,7 +111,10 @@ def _by_weight(
     measured: MeasuredPrototype,
     drawn: Mapping[str, Shape],
 ) -> Floats:
-    """(K, 3, 3) displacements of the balls at angle zero, mm, by one g along x, y, z: last axis."""
+    """(K, 6, 3) displacements of the balls at angle zero, mm, then turns of their seats, radians.
+
+    By one g along x, y, z: last axis.
+    """
     printer, axis = context.export.spec.printer, context.frame[0]
     carrier = [one for one in of_roles(parts, "base") if one.part.name != ZERO_DISC]
     mesh = join_meshes([one.placed_mesh for one in carrier])
@@ -109,7 +130,7 @@ def _moved(
     seats: tuple[Floats, Floats, Floats],
     material: tuple[float, float],
 ) -> Floats:
-    """(K, 3, 3) at a modulus of 1 MPa, held on the shaft, whose corners are (n, 3).
+    """(K, 6, 3) at a modulus of 1 MPa, held on the shaft, whose corners are (n, 3).
 
     seats: centres (K, 3), radii (K,) and masses (K,) of the balls; material: infill, density.
     """
@@ -120,11 +141,11 @@ def _moved(
     reach = np.linalg.norm(shaft - (shaft @ axis)[:, None] * axis, axis=1).max() + STEP_MM
     held = (bricks.share > 0) & (out < reach) & (along < (shaft @ axis).max() + STEP_MM)
     weight = bricks.spread(bricks.share * STEP_MM**3 * density * 1e-3)
-    near = _near(bricks, *seats[:2])
-    for mass, one in zip(seats[2], near, strict=True):
-        weight = weight + bricks.spread(one / one.sum()) * mass
-    moved = bricks.solve(held, weight[:, None, None] * G_MM * np.eye(3))
-    return np.stack([_shift(bricks, moved, *pair) for pair in zip(seats[0], near, strict=True)])
+    load, near = weight[:, None, None] * np.eye(3), _near(bricks, *seats[:2])
+    for centre, mass, one in zip(seats[0], seats[2], near, strict=True):
+        load += mass * _carrying(bricks, centre, one)
+    moved = bricks.solve(held, load * G_MM)
+    return np.stack([_motion(bricks, moved, *pair) for pair in zip(seats[0], near, strict=True)])
 
 
 def _near(bricks: Bricks, centres: Floats, radii: Floats) -> list[Floats]:
@@ -135,16 +156,36 @@ def _near(bricks: Bricks, centres: Floats, radii: Floats) -> list[Floats]:
     ]
 
 
-def _shift(bricks: Bricks, moved: Floats, centre: Floats, near: Floats) -> Floats:
-    """(3, 3) of a centre as material near it is moved, by the best rigid motion."""
+def _carrying(bricks: Bricks, centre: Floats, near: Floats) -> Floats:
+    """(n, 3, 3) forces on nodes near a centre that carry a unit weight in it along x, y, z.
+
+    Their moment about the centre is zero: pads press toward it. Spread evenly they would turn the
+    seat, by a third of what its turn changes from stop to stop.
+    """
+    cell, cube = np.nonzero(near)
+    motion = rigid_motions(bricks.place[cell, cube] - centre)
+    share = np.repeat(near[cell, cube], 3)[:, None] * motion
+    force = (share @ np.linalg.inv(motion.T @ share))[:, :3].reshape(-1, 1, 3, 3)
+    load = np.zeros((bricks.nodes, 3, 3))
+    np.add.at(load, bricks.node[cell], shapes()[cube][:, :, None, None] * force)
+    return load
+
+
+def _motion(bricks: Bricks, moved: Floats, centre: Floats, near: Floats) -> Floats:
+    """(6, 3) shift and turn about a centre as material near it is moved, by the best motion."""
     cell, cube = np.nonzero(near)
     there = np.einsum("mi,mikl->mkl", shapes()[cube], moved[bricks.node[cell]])
     motion = rigid_motions(bricks.place[cell, cube] - centre)
-    return np.asarray(np.linalg.lstsq(motion, there.reshape(-1, 3), rcond=None)[0][:3])
+    return np.asarray(np.linalg.lstsq(motion, there.reshape(-1, 3), rcond=None)[0])
 
 
 def _without_motions(moved: Floats, centre: Floats) -> Floats:
     """(S, K, 3) displacements of the balls (K, 3) less the best rigid motion of each stop."""
-    motion = rigid_motions(centre)
+    fitted = motions(moved, centre) @ rigid_motions(centre).T
+    return np.asarray(moved - fitted.reshape(moved.shape))
+
+
+def motions(moved: Floats, centre: Floats) -> Floats:
+    """(S, 6) shifts and turns that fit displacements (S, K, 3) of the balls (K, 3) best."""
     flat = moved.reshape(len(moved), -1)
-    return np.asarray((flat - flat @ np.linalg.pinv(motion).T @ motion.T).reshape(moved.shape))
+    return np.asarray(flat @ np.linalg.pinv(rigid_motions(centre)).T)

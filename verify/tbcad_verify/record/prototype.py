@@ -142,7 +142,10 @@ class Stops(Columns):
 
 
 class SagTable(Columns):
-    """sag.csv: how weight moves a ball at a stop, by what bends; one pair a row, stop by stop."""
+    """sag.csv: how weight moves a ball at a stop, by what bends; one pair a row, stop by stop.
+
+    The carrier also turns its seat: a small rotation vector.
+    """
 
     most_rows: ClassVar[int] = MOST_ROWS
 
@@ -160,14 +163,20 @@ class SagTable(Columns):
     uprights_x_mm: Numbers
     uprights_y_mm: Numbers
     uprights_z_mm: Numbers
+    carrier_turn_x_rad: Numbers
+    carrier_turn_y_rad: Numbers
+    carrier_turn_z_rad: Numbers
 
     def moved(self, shape: tuple[int, ...]) -> Floats | None:
-        """(4, S, K, 3) by carrier, head, shaft and uprights, mm; None: of others than (S, K, 3)."""
+        """(5, S, K, 3): mm by carrier, head, shaft and uprights, and the seats' turns, radians.
+
+        None: of others than (S, K, 3).
+        """
         pairs = np.indices(shape[:2]).reshape(2, -1) + 1
         if not np.array_equal(pairs, [self.stop, self.ball]):
             return None
-        values = [getattr(self, name) for name in type(self).model_fields if name.endswith("_mm")]
-        return np.stack(values).reshape(4, 3, *shape[:2]).transpose(0, 2, 3, 1)
+        values = [getattr(self, name) for name in list(type(self).model_fields)[2:]]
+        return np.stack(values).reshape(5, 3, *shape[:2]).transpose(0, 2, 3, 1)
 
 
 class Seat(Strict):

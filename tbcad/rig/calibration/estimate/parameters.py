@@ -71,7 +71,7 @@ class Block(StrEnum):
     # radians; then a shift along these and along the axis, mm.
     TURN = "turn", Of.FRAME, 2
     SHIFT = "shift", Of.FRAME, 3
-    # By which the spheres' sag is larger than the mean's, as a share.
+    # By which the spheres' sag and their seats' turns are larger than the mean's, as a share.
     SAG = "sag", Of.MACHINE, 1
     # Of caps: tilts in their seats about two directions across their arms, radians, which take
     # spheres and forms along; by which sagittas are larger over the part in use, the apex where it
@@ -209,6 +209,7 @@ class Prior:
             turn=_sum(mean.turn, x[Block.TURN] @ self.across),
             shift=_sum(mean.shift, x[Block.SHIFT] @ self.ways),
             sag=None if mean.sag is None else (1 + x[Block.SAG][0]) * mean.sag,
+            seat_turn=(None if mean.seat_turn is None else (1 + x[Block.SAG][0]) * mean.seat_turn),
             forms=forms,
         )
 
@@ -340,12 +341,15 @@ def turn_slopes(
     wobble = Rotation.from_rotvec(turn).as_matrix()
     tilts = left_jacobian(prior.tilt(values).as_rotvec()) @ prior.across.T
     about = wobble @ machine.axis[:, None]
-    on_base = (
-        wobble @ _matrices(machine.axis, machine.angle[frame]) @ prior.tilt(values).as_matrix()
-    )
+    rotation = wobble @ _matrices(machine.axis, machine.angle[frame])
+    seat = rotation @ machine.seat_turns(frame, sphere).as_matrix()
+    on_base, mean = seat @ prior.tilt(values).as_matrix(), prior.mean.seat_turn
+    by_sag = np.zeros((len(frame), 3)) if mean is None else mean[frame, sphere]
+    # A seat's turn is not tilted along with the base.
     return {
         Block.CAP_TILT: on_base @ cap_turns(prior, values)[sphere].swapaxes(1, 2),
-        Block.TILT: wobble @ tilts,
+        Block.TILT: wobble @ tilts + (seat - rotation) @ tilts,
+        Block.SAG: rotation @ by_sag[..., None],
         Block.OFFSET: about,
         Block.ANGLES: about,
         Block.TURN: left_jacobian(turn) @ prior.across.T,

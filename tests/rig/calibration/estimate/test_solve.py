@@ -268,6 +268,19 @@ def test_weight_turns_a_flat_cap_with_its_seat() -> None:
     assert found == pytest.approx(expected, abs=1e-3)
 
 
+def test_a_seat_that_turns_its_own_way_takes_its_cap_along_and_leaves_balls_in_place() -> None:
+    own = 1e-3 * np.random.default_rng(4).standard_normal(NONE.shape)
+    moved = sag_motion(MACHINE, SEATS, NONE, own)
+    assert moved.sag[:, CAP] == pytest.approx(np.cross(own, MACHINE.centre - SEATS)[:, CAP])
+    assert np.delete(moved.sag, CAP, axis=1) == pytest.approx(0, abs=1e-12)
+    bent = replace(MACHINE, sag=moved.sag, seat_turn=moved.seat_turn)
+    frame = np.arange(len(MACHINE.angle))
+    sphere = np.full_like(frame, CAP)
+    body = np.broadcast_to(SEATS[CAP], (len(frame), 3))
+    still = MACHINE.placed(body, frame)
+    assert bent.on_spheres(body, frame, sphere) == pytest.approx(still, abs=1e-4)
+
+
 def test_a_measured_radius_replaces_the_drawing() -> None:
     parsed = parse_measured(("1=43.2", "2 = 34.61:0.005"), 5)
     assert parsed == ((0, 43.2, MEASURED_MM), (1, 34.61, 0.005))

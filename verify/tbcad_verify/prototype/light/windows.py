@@ -91,7 +91,9 @@ def ray_transfer(measured: MeasuredPrototype) -> RayTransfer:
 
 
 def held_base(measured: MeasuredPrototype) -> HeldBase:
-    """The base at the picture of each mirror: with its ball, turned as all balls' best motion is.
+    """The base at the picture of each mirror: with its ball, turned as the ball's seat is.
+
+    By the carrier each seat turns its own way, by the rest as all balls' best motion does.
 
     Unknown: sag.csv has other stops or balls.
     """
@@ -99,9 +101,12 @@ def held_base(measured: MeasuredPrototype) -> HeldBase:
     moved, seats = context.sag_at_stops, measured.seated.T
     stops = context.base_rotation(np.radians(context.prototype.stops.angle)).as_matrix()
     places = seats @ stops.swapaxes(1, 2)
-    turn = np.stack([_best_turn(*pair) for pair in zip(places, moved, strict=True)])
+    told = context.told_sag
+    as_one, own = (moved, 0 * moved) if told is None else (told[1:4].sum(axis=0), told[4])
+    turn = np.stack([_best_turn(*pair) for pair in zip(places, as_one, strict=True)])
     stop, ball = context.stop, context.ball
-    matrix = (Rotation.from_rotvec(turn[stop]).as_matrix() @ stops[stop]).transpose(1, 2, 0)
+    by_weight = Rotation.from_rotvec(turn[stop] + own[stop, ball])
+    matrix = (by_weight.as_matrix() @ stops[stop]).transpose(1, 2, 0)
     place = (places + moved)[stop, ball].T
     return HeldBase(matrix, place - rotated(matrix, seats[ball].T))
 
