@@ -44,19 +44,25 @@ def background_processes(number: int = 1) -> Iterator[Submit]:
     Exception: the first that the work raised; ProcessLost: a process ended before its work was
     done.
     """
+    with Processes(number) as processes, background_work(processes) as submit:
+        yield submit
+
+
+@contextmanager
+def background_work(processes: Processes) -> Iterator[Submit]:
+    """The same in processes that are there before and after the block."""
     futures: list[Future[Any]] = []
-    with Processes(number) as processes:
 
-        def submit(work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-            futures.append(processes.submit(work, *arguments))
-            return futures[-1]
+    def submit(work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        futures.append(processes.submit(work, *arguments))
+        return futures[-1]
 
-        try:
-            yield submit
-            for future in futures:
-                future.result()
-        except ProcessEnded as end:
-            raise ProcessLost(f"a process ended before its work was done: {end}") from None
+    try:
+        yield submit
+        for future in futures:
+            future.result()
+    except ProcessEnded as end:
+        raise ProcessLost(f"a process ended before its work was done: {end}") from None
 
 
 Unit = TypeVar("Unit")

@@ -8,12 +8,18 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from tbcad.app.api.designs import chosen_spec
-from tbcad.app.api.verification import verify as verification
+from tbcad.app.api.verification import verification
 from tbcad.common.atomic_files import InFolder
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.load import option_texts
 from tbcad.errors import InputError
-from tbcad.options.builds import DEFAULT_YIELD, BuildOptions, ReportOptions, check_yield
+from tbcad.options.builds import (
+    DEFAULT_YIELD,
+    BuildOptions,
+    ReportOptions,
+    VerificationOptions,
+    check_yield,
+)
 from tbcad.options.call import keywords, silent
 from tbcad.options.checks import check_is_capture, check_is_export, check_is_folder
 
@@ -169,13 +175,14 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
     The files are read back before they replace the old ones.
     """
     from tbcad_verify.report.as_made import AsMade
+    from tbcad_verify.run.processes import Processes
 
-    from tbcad.common.schedule import background_processes
+    from tbcad.common.schedule import background_work
     from tbcad.output.folder import replacing
 
     out, verify, progress = Path(options.out), options.verify, options.progress
-    with replacing(out, "build", options.force) as folder:
-        with background_processes() as submit:
+    with Processes(1) as worker, replacing(out, "build", options.force) as folder:
+        with background_work(worker) as submit:
             submit(_load_libraries)  # while the mirrors are computed here
             from tbcad.core.mirrors.array import design
 
@@ -191,8 +198,9 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
         report = None
         if verify:
             cutter = plan.process.ball_mm if plan.process else None
+            asked = VerificationOptions(folder, progress=progress, cutter=cutter)
             report = replace(
-                verification(folder, progress=progress, cutter=cutter),
+                verification(asked, worker),  # which has the kernel loaded
                 folder=out,
                 note=export.note,
                 as_made=replace(

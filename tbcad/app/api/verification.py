@@ -19,6 +19,7 @@ from tbcad.options.checks import check_is_export, check_is_object
 if TYPE_CHECKING:
     from tbcad_verify.as_built.verify import AsBuiltReport
     from tbcad_verify.report.report import Report
+    from tbcad_verify.run.processes import Processes
 
     from tbcad.tolerancing.analysis import Analysis
     from tbcad.tolerancing.process.process import Process
@@ -36,6 +37,11 @@ def verify(options: VerificationOptions) -> Report:
         InputError: the folder is no readable build.
     """
     options.check()
+    return verification(options)
+
+
+def verification(options: VerificationOptions, idle: Processes | None = None) -> Report:
+    """The same; `idle` is as `tbcad_verify` takes it."""
     from tbcad_verify.errors import BadExport
     from tbcad_verify.run.verify import VerifyOptions
     from tbcad_verify.run.verify import verify as verify_files
@@ -50,7 +56,10 @@ def verify(options: VerificationOptions) -> Report:
     )
     try:
         return verify_files(
-            Path(options.exports), lambda name: options.progress(f"verification: {name}"), asked
+            Path(options.exports),
+            lambda name: options.progress(f"verification: {name}"),
+            asked,
+            idle,
         )
     except BadExport as error:
         raise InputError(str(error)) from None

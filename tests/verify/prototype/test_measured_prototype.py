@@ -372,6 +372,21 @@ def test_a_swing_is_that_of_many_angles(measured: MeasuredPrototype, seed: int) 
     assert found.volume > swing.TOUCH_MM3 or volume < 1
     assert found.volume == 0 or volume > 0 or gap < 0.5
     assert volume > 0 or found.gap <= gap + 0.01
+    room = swing.room_of([one], measured.context.frame)
+    assert max((turned - room).volume() for turned in at) < 1e-6
+    near = swing.axial_solid(measured, "body", solids[1] ^ room)
+    again = swing.sweep(swing.swing_ends(measured), one, near)
+    assert again.volume == pytest.approx(found.volume)
+    assert abs(again.gap - found.gap) < 0.2
+
+
+def test_nothing_out_of_reach_is_swept(measured: MeasuredPrototype) -> None:
+    rng = np.random.default_rng(5)
+    one, far = (swing.axial_solid(measured, "body", random_body(rng)) for _ in range(2))
+    room = swing.room_of([one], measured.context.frame)
+    none = swing.axial_solid(measured, "far", far.solid.translate([0, 0, 1e4]) ^ room)
+    found = swing.sweep((0.0, 1.0), one, none)
+    assert (found.volume, found.gap, found.samples) == (0.0, swing.SEARCH_MM, 1)
 
 
 def stepped(folder: Path, low: list[float], high: list[float]) -> Path:

@@ -99,6 +99,17 @@ def test_each_ends_alone() -> None:
     }
 
 
+def test_idle_processes_go_on_elsewhere() -> None:
+    with Processes(1) as before:
+        own = before.call(os.getpid)
+        with Processes(2, 30.0, before) as after:
+            assert after.call(os.getpid) == own
+            with pytest.raises(ProcessEnded, match="SIGKILL"):
+                after.call(end, "crash")
+            assert after.call(os.getpid) not in (own, os.getpid())
+        assert before.call(os.getpid) != own
+
+
 def test_all_work_at_once(tmp_path: Path) -> None:
     places = tmp_path / "a", tmp_path / "b"
     with Processes(2) as processes:

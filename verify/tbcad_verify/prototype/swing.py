@@ -26,6 +26,7 @@ GRAIN_MM = 3.0  # longest edge between points on surfaces
 # Points of two surfaces may be farther apart than these by this: no point of a facet is farther
 # from a corner than 1/sqrt(3) of its longest edge.
 BETWEEN_MM = 2 * GRAIN_MM / float(np.sqrt(3))
+FARTHEST_MM = SEARCH_MM + BETWEEN_MM
 CLEAR_MM = 1.0  # a distance about the axis for which one sample is enough
 GROWTH = 1.5  # of a distance from one sample to the next, mostly at most
 MIN_LEVER_MM = 1e-9
@@ -89,12 +90,11 @@ class AxialSolid:
 
         It is infinite where it is more than `SEARCH_MM`, which for most pairs boxes of facets show.
         """
-        farthest = SEARCH_MM + BETWEEN_MM
-        if self._facets_apart(other) > farthest or other._facets_apart(self) > farthest:
+        if max(self._facets_apart(other), other._facets_apart(self)) > FARTHEST_MM:
             return np.inf
-        low, high = self.profile.min(axis=0) - farthest, self.profile.max(axis=0) + farthest
+        low, high = self.profile.min(axis=0) - FARTHEST_MM, self.profile.max(axis=0) + FARTHEST_MM
         near = other.profile[((other.profile >= low) & (other.profile <= high)).all(axis=1)]
-        distance = self.tree.query(near, distance_upper_bound=farthest)[0]
+        distance = self.tree.query(near, distance_upper_bound=FARTHEST_MM)[0]
         return float(np.min(distance, initial=np.inf)) - BETWEEN_MM
 
     def _facets_apart(self, other: AxialSolid) -> float:
@@ -123,10 +123,10 @@ def checks(
 ) -> list[Check]:
     """Rotate the base from end to end of its swing."""
     swing, clearance = names
-    moving, still = (
-        [axial_solid(measured, *one) for one in group] for group in _groups(measured, closed)
-    )
-    ends = swing_ends(measured)
+    swung, fixed = _groups(measured, closed)
+    moving = [axial_solid(measured, *one) for one in swung]
+    room, ends = room_of(moving, context.frame), swing_ends(measured)
+    still = [axial_solid(measured, name, solid ^ room) for name, solid in fixed]
     past = [sweeps_past(one, moving, ends) for one in still]
     sweeps = [one for of_moving in zip(*past, strict=True) for one in of_moving]
     volume = max((one.volume for one in sweeps), default=0.0)
@@ -168,6 +168,20 @@ def _groups(
         if screws:
             groups[turns].append((title, manifold3d.Manifold.compose(screws)))
     return groups[True], groups[False]
+
+
+def room_of(moving: Sequence[AxialSolid], frame: Floats) -> Any:
+    """A box that solids do not leave at any angle, and `FARTHEST_MM` round it.
+
+    What is fixed outside it cannot matter.
+    """
+    import manifold3d
+
+    ends = np.array([one.box for one in moving]).reshape(-1, 2, 2)
+    low = ends[:, 0, 0].min(initial=0) - FARTHEST_MM
+    high, reach = ends[:, 1].max(axis=0, initial=0) + FARTHEST_MM
+    cube = manifold3d.Manifold.cube([high - low, 2 * reach, 2 * reach])
+    return cube.translate([low, -reach, -reach]).transform(np.c_[frame.T, np.zeros(3)])
 
 
 def swing_ends(measured: MeasuredPrototype) -> tuple[float, float]:

@@ -49,16 +49,24 @@ class Processes(ThreadPoolExecutor):
     process can be started, calls are done here, with the same results.
     """
 
-    def __init__(self, number: int, seconds: float | None = None) -> None:
+    def __init__(
+        self, number: int, seconds: float | None = None, idle: Processes | None = None
+    ) -> None:
         """Work with so many processes at most.
 
         `seconds`: time limit of a call between what it reports; None: there is none.
+        `idle`: others, whose calls are done: their processes, with libraries loaded, go on here.
         """
         super().__init__(number)
         self.seconds = seconds
-        self._idle: list[_Process] = []
-        self._all: list[_Process] = []
+        self._idle: list[_Process] = idle._handed_over() if idle else []
+        self._all = [*self._idle]
         self._killed = False
+
+    def _handed_over(self) -> list[_Process]:
+        idle, self._idle = self._idle, []
+        self._all = [process for process in self._all if process not in idle]
+        return idle
 
     def submit(  # type: ignore[override]
         self,

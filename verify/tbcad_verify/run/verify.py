@@ -60,11 +60,15 @@ class VerifyOptions:
 
 
 def verify(
-    folder: Path, progress: Progress = lambda _: None, options: VerifyOptions = VerifyOptions()
+    folder: Path,
+    progress: Progress = lambda _: None,
+    options: VerifyOptions = VerifyOptions(),
+    idle: Processes | None = None,
 ) -> Report:
     """Verify a build, and write verify.json into it.
 
     `progress`: called with the name of each stage before it starts.
+    `idle`: processes that have done their work, and with a kernel loaded can read STEP files.
 
     BadExport: the folder is not a readable build, or cannot be written to; nothing is written.
     """
@@ -74,7 +78,7 @@ def verify(
     before = stamps(root, listed_names(root))
     export = read_export(root)
     results = CollectedResults(progress=progress)
-    _run(export, options, results)
+    _run(export, options, results, idle)
     programs = _ask_programs(export, results, options.seconds) if options.clients else []
     _refuse_changes(export, before)
     blank = np.full(len(export.mirrors), np.nan)
@@ -99,10 +103,12 @@ def verify(
     return report
 
 
-def _run(export: Export, options: VerifyOptions, results: CollectedResults) -> None:
+def _run(
+    export: Export, options: VerifyOptions, results: CollectedResults, idle: Processes | None
+) -> None:
     """All stages; an interrupt ends the processes that read files, which take long."""
     work = export.folder, options.printers, options.cutter_mm
-    with _steps(export, options.seconds) as steps:
+    with _steps(export, options.seconds, idle) as steps:
         # Reading STEP files needs none of the stages, and takes as long as they do.
         if options.apart:
             watch(stage_titles(export), results, options.seconds, run_in_two, *work)
@@ -142,9 +148,9 @@ def _unknown_stages(titles: Sequence[str], begun: Sequence[str], reason: str) ->
 
 
 @contextmanager
-def _steps(export: Export, seconds: float) -> Iterator[Callable[[], Steps]]:
+def _steps(export: Export, seconds: float, idle: Processes | None) -> Iterator[Callable[[], Steps]]:
     """Read STEP files while the block runs; the value waits for them."""
-    with ThreadPoolExecutor(1) as pool, Processes(PROCESSES, seconds) as processes:
+    with ThreadPoolExecutor(1) as pool, Processes(PROCESSES, seconds, idle) as processes:
         yield pool.submit(copy_context().run, _read_steps, export, processes).result
 
 
