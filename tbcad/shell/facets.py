@@ -26,6 +26,9 @@ from tbcad.shell.cell_outlines import (
 from tbcad.types import Floats, Ints
 
 ROUNDS = 3  # the search is in a plane, so what it finds on a sphere is looked for again from there
+# Cosine of the angle between a facet and its sphere: 0.96 in the worst cells that can be built,
+# 0.02 where slivers stand up and fold.
+MIN_ALONG_SPHERE = 0.5
 
 
 def means(points: Floats, cell: Ints) -> Floats:
@@ -43,8 +46,7 @@ def middles(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
     """
     every, cell, edge = np.arange(len(mirrors)), outlines.cell, outlines.points
     middle = mirrors.projected(every, means(edge, cell))
-    outside = -mirrors.gradient(cell, edge)
-    inward = unit(np.cross(outside, edge[outlines.following] - edge))
+    inward = _inward(outlines, mirrors)
     for _ in range(ROUNDS):
         hidden = np.unique(cell[dot(inward, middle[cell] - edge) <= 0])
         if not len(hidden):
@@ -54,9 +56,20 @@ def middles(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
             lines = edge[cell == k], inward[cell == k]
             middle[k] += _deepest_step(middle[k], axes, *lines)
         middle = mirrors.projected(every, middle)
-    raise SpecError(
-        f"a side of mirror a{hidden[0] + 1:04d} bends so far inward that no point of the mirror "
-        "sees its whole outline: make optics.semi_minor_mm larger or increase optics.n"
+    raise _bent_inward(int(hidden[0]), "no point of the mirror sees its whole outline")
+
+
+def _inward(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
+    """Unit vectors (b, 3) square to the outlines' segments, into their cells."""
+    cell, edge = outlines.cell, outlines.points
+    outside = -mirrors.gradient(cell, edge)
+    return unit(np.cross(outside, edge[outlines.following] - edge))
+
+
+def _bent_inward(mirror: int, effect: str) -> SpecError:
+    return SpecError(
+        f"a side of mirror a{mirror + 1:04d} bends so far inward that {effect}: make "
+        "optics.semi_minor_mm larger or increase optics.n"
     )
 
 
@@ -105,7 +118,25 @@ def _spherical(spec: Spec, cells: Cells, outlines: CellOutlines, distance: Float
     width = strip_widths(spec.mesh.ray_error_mm, mirrors.radius, distance, middle)
     strip = mirrors.projected(cell, strip_points(outlines, middle, outside, width))
     rings = np.ceil(farthest / np.sqrt(4 * spec.mesh.chord_error_mm * mirrors.radius))
-    return _ringed(outlines, mirrors, middle, strip, rings.astype(np.int64))
+    facets = _ringed(outlines, mirrors, middle, strip, rings.astype(np.int64))
+    _check_facets(facets, mirrors)
+    return facets
+
+
+def _check_facets(facets: Facets, mirrors: Surfaces) -> None:
+    """SpecError where a facet stands up from its sphere, and so folds the surface."""
+    a, b, c = facets.vertices[facets.triangles.T]
+    square = np.cross(b - a, c - a)
+    along = dot(square, mirrors.gradient(facets.mirror, a))
+    if np.all(along >= MIN_ALONG_SPHERE * norm(square)):
+        return
+    worst = int(np.argmin(along - MIN_ALONG_SPHERE * norm(square)))
+    longest = max(norm(side[worst]) for side in (b - a, c - b, a - c))
+    raise _bent_inward(
+        int(facets.mirror[worst]),
+        f"its facets would fold: one {longest:.2g} mm long is {norm(square[worst]) / longest:.2g} "
+        "mm wide",
+    )
 
 
 def _ringed(
