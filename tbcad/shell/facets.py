@@ -6,6 +6,7 @@ outline, cut into rectangles, it is w / 2 from the outline whatever the rectangl
 strip makes what a mirror covers on its facets nearly what it covers on its sphere.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +14,14 @@ from scipy.optimize import linprog
 
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.reflection import miss_distances
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.shell.cell_outlines import (
     CellOutlines,
     cell_outlines,
+    rows_and_columns,
     segment_counts,
     strip_points,
     strip_widths,
@@ -29,6 +32,7 @@ ROUNDS = 3  # the search is in a plane, so what it finds on a sphere is looked f
 # Cosine of the angle between a facet and its sphere: 0.96 in the worst cells that can be built,
 # 0.02 where slivers stand up and fold.
 MIN_ALONG_SPHERE = 0.5
+MARGINS_PER_MM = 10  # steps of a margin that an error names
 
 
 def means(points: Floats, cell: Ints) -> Floats:
@@ -98,6 +102,36 @@ def mirror_facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
     if np.all(cells.surfaces.curvature == 0):
         return _planar(outlines)
     return _spherical(spec, cells, outlines, distance)
+
+
+def facet_coverage(spec: Spec, cells: Cells, facets: Facets) -> float:
+    """Coverage diameter that facets show, mm, as 32-bit floats hold them.
+
+    They cost most along the outline: of the facets there rays off both ends count.
+    """
+    outlines, pinhole = facets.outlines, np.array(spec.optics.camera_mm)
+    _, sides = cells.rings
+    arc = sides[rows_and_columns(outlines.segments[sides // 2])[0]] // 2
+    cut = (cells.arcs.faces[arc] == cells.seam).any(axis=1) & cells.halved[outlines.cell]
+    written = facets.vertices.astype(np.float32).astype(np.float64)
+    beside = written[facets.triangles[: len(arc)]][~cut]
+    a, b, c = beside.swapaxes(0, 1)
+    normal = unit(np.cross(b - a, c - a))
+    ends = written[np.stack([outlines.vertex, outlines.vertex[outlines.following]])][:, ~cut]
+    return 2 * float(miss_distances(pinhole, ends, normal).min())
+
+
+def check_coverage(spec: Spec, cells: Cells, facets: Facets) -> None:
+    """SpecError where facets of mirrors by rule traced show less than the capture sphere."""
+    wanted, margin = spec.optics.capture_diameter_mm, spec.mirrors.margin_mm
+    shown = facet_coverage(spec, cells, facets)
+    if spec.mirrors.radius_rule == "traced" and shown < wanted:
+        enough = math.ceil((margin + wanted - shown) * MARGINS_PER_MM) / MARGINS_PER_MM
+        raise SpecError(
+            f"facets of the mirrors show {shown:.2f} mm, less than optics.capture_diameter_mm "
+            f"{wanted:g}: make mirrors.margin_mm {enough:g} instead of {margin:g}, or "
+            "mesh.ray_error_mm smaller"
+        )
 
 
 def _planar(outlines: CellOutlines) -> Facets:

@@ -181,13 +181,13 @@ class ShellSpec(Section):
 class MeshSpec(Section):
     """How fine the STL and 3MF are."""
 
-    ray_error_mm: float = Field(0.05, ge=0.01, le=10)
+    ray_error_mm: float = Field(0.05, ge=0.01, le=1)
     """How far a ray off a facet at a mirror's rim may miss, at the capture sphere, the ray off
     the exact sphere: a facet reflects like a flat mirror."""
-    chord_error_mm: float = Field(0.015, ge=0.0002, le=1)
+    chord_error_mm: float = Field(0.015, ge=0.0002, le=0.5)
     """Distance of a mirror's facets from its sphere; the stricter of this and ray_error_mm
     counts."""
-    structure_error_mm: float = Field(0.02, ge=0.002, le=5)
+    structure_error_mm: float = Field(0.02, ge=0.002, le=0.5)
     """Distance of all other facets (back, flanges, holes) from the exact surface."""
 
 

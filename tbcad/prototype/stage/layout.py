@@ -79,7 +79,7 @@ def stage_layout(
         NECK_SHARE * _grazing_radius(prototype, keep_out.capture),
         NECK_OF_POST * post,
     )
-    wire = _bore(neck, len(leds) > 0)
+    wire = bore_radius(neck, len(leds) > 0)
     plate = stage.top_mm - DISC_MM
     pockets = leds[:, 2] - (led["height_mm"] - led["diameter_mm"] / 2)
     joint = -keep_out.capture - BELOW_MM - (post - neck) - SHOULDER_MM
@@ -108,7 +108,7 @@ def stage_layout(
     return StageLayout(sizes, foot, led, leds, components, column, clamp, light, swept)
 
 
-def _bore(neck: float, wired: bool) -> float:
+def bore_radius(neck: float, wired: bool) -> float:
     """Radius of the wires' bore in a neck of a radius, mm, 0 without wires.
 
     SpecError: light leaves too little room for a neck whose walls can be printed.
