@@ -152,12 +152,10 @@ def _spherical(spec: Spec, cells: Cells, outlines: CellOutlines, distance: Float
     width = strip_widths(spec.mesh.ray_error_mm, mirrors.radius, distance, middle)
     strip = mirrors.projected(cell, strip_points(outlines, middle, outside, width))
     rings = np.ceil(farthest / np.sqrt(4 * spec.mesh.chord_error_mm * mirrors.radius))
-    facets = _ringed(outlines, mirrors, middle, strip, rings.astype(np.int64))
-    _check_facets(facets, mirrors)
-    return facets
+    return _ringed(outlines, mirrors, middle, strip, rings.astype(np.int64))
 
 
-def _check_facets(facets: Facets, mirrors: Surfaces) -> None:
+def check_folds(facets: Facets, mirrors: Surfaces) -> None:
     """SpecError where a facet stands up from its sphere, and so folds the surface."""
     a, b, c = facets.vertices[facets.triangles.T]
     square = np.cross(b - a, c - a)

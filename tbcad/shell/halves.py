@@ -29,7 +29,7 @@ def camera_a_mesh(
 ) -> Mesh:
     """Mesh of camera a's half; the envelope is worked out (or SpecError) where it is not given.
 
-    SpecError where its facets must cover the capture sphere and do not.
+    SpecError where its facets must cover the capture sphere and do not, or fold.
     """
     array = design.arrays[0]
     envelope = envelope or shell_envelope(design)
