@@ -25,7 +25,10 @@ from tbcad.types import Progress
 # share of it: what PrusaSlicer 2.5 says of the paper's prototype with the settings of the parts
 # list's estimates (tbcad.prototype.slicing), by the nozzle's diameter.
 HOURS_PER_CM3, FILLED = {0.4: 0.080, 0.6: 0.043}, 0.84
-COARSE = MeshSpec(ray_error_mm=10.0, chord_error_mm=1.0, structure_error_mm=0.5)
+# Coarser than a design may ask for.
+COARSE = MeshSpec().model_copy(
+    update={"ray_error_mm": 10.0, "chord_error_mm": 1.0, "structure_error_mm": 0.5}
+)
 MM3_PER_CM3 = 1000.0
 
 

@@ -23,7 +23,7 @@ from tbcad.prototype.balls.layout import BallChoices, PrototypeLayout, ball_coun
 from tbcad.prototype.base.caps import cap_magnets
 from tbcad.prototype.base.fasteners import base_fasteners
 from tbcad.prototype.base.layout import BaseLayout, base_layout, carrier_masses
-from tbcad.prototype.base.split import BaseSplit, split_base
+from tbcad.prototype.base.split import BaseSplit, BedError, split_base
 from tbcad.prototype.drive.balance import (
     OVERTRAVEL_DEG,
     BaseBalance,
@@ -55,6 +55,7 @@ if TYPE_CHECKING:
 
 OPEN_BASE_KEYS = ("pad_angle_deg", "hold", "hub_boss_mm")
 """Keys of the section [prototype.base] that an arrangement chooses where they are "auto"."""
+BEDS_TRIED = 3  # arrangements that only the bed is too small for, before the search ends
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +107,8 @@ def arrangements(design: MirrorDesign) -> Iterator[PrototypeModel]:
     """Every arrangement that has room, the preferred first.
 
     SpecError at the end, when there was none; it names the cause in the preferred one, and what was
-    tried.
+    tried. Where the bed alone is too small for several, it is for all: more balls and longer hubs
+    need larger ones.
     """
     tried, arranged, errors = list[int](), False, list[SpecError]()
     for spec, outcome in _attempts(design):
@@ -116,6 +118,9 @@ def arrangements(design: MirrorDesign) -> Iterator[PrototypeModel]:
             yield outcome
         else:
             errors.append(outcome)
+        beds = [error for error in errors if isinstance(error, BedError)]
+        if len(beds) == BEDS_TRIED and not arranged:
+            raise BedError(f"{beds[0]}{_remedy(design, tried)}") from None
     if errors and not arranged:
         raise SpecError(f"{errors[0]}{_remedy(design, tried)}") from None
 

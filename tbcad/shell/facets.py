@@ -6,6 +6,7 @@ outline, cut into rectangles, it is w / 2 from the outline whatever the rectangl
 strip makes what a mirror covers on its facets nearly what it covers on its sphere.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +14,14 @@ from scipy.optimize import linprog
 
 from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.cells import Cells
+from tbcad.core.optics.reflection import miss_distances
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.shell.cell_outlines import (
     CellOutlines,
     cell_outlines,
+    rows_and_columns,
     segment_counts,
     strip_points,
     strip_widths,
@@ -26,6 +29,10 @@ from tbcad.shell.cell_outlines import (
 from tbcad.types import Floats, Ints
 
 ROUNDS = 3  # the search is in a plane, so what it finds on a sphere is looked for again from there
+# Cosine of the angle between a facet and its sphere: 0.96 in the worst cells that can be built,
+# 0.02 where slivers stand up and fold.
+MIN_ALONG_SPHERE = 0.5
+MARGINS_PER_MM = 10  # steps of a margin that an error names
 
 
 def means(points: Floats, cell: Ints) -> Floats:
@@ -43,8 +50,7 @@ def middles(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
     """
     every, cell, edge = np.arange(len(mirrors)), outlines.cell, outlines.points
     middle = mirrors.projected(every, means(edge, cell))
-    outside = -mirrors.gradient(cell, edge)
-    inward = unit(np.cross(outside, edge[outlines.following] - edge))
+    inward = _inward(outlines, mirrors)
     for _ in range(ROUNDS):
         hidden = np.unique(cell[dot(inward, middle[cell] - edge) <= 0])
         if not len(hidden):
@@ -54,9 +60,20 @@ def middles(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
             lines = edge[cell == k], inward[cell == k]
             middle[k] += _deepest_step(middle[k], axes, *lines)
         middle = mirrors.projected(every, middle)
-    raise SpecError(
-        f"a side of mirror a{hidden[0] + 1:04d} bends so far inward that no point of the mirror "
-        "sees its whole outline: make optics.semi_minor_mm larger or increase optics.n"
+    raise _bent_inward(int(hidden[0]), "no point of the mirror sees its whole outline")
+
+
+def _inward(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
+    """Unit vectors (b, 3) square to the outlines' segments, into their cells."""
+    cell, edge = outlines.cell, outlines.points
+    outside = -mirrors.gradient(cell, edge)
+    return unit(np.cross(outside, edge[outlines.following] - edge))
+
+
+def _bent_inward(mirror: int, effect: str) -> SpecError:
+    return SpecError(
+        f"a side of mirror a{mirror + 1:04d} bends so far inward that {effect}: make "
+        "optics.semi_minor_mm larger or increase optics.n"
     )
 
 
@@ -87,6 +104,41 @@ def mirror_facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
     return _spherical(spec, cells, outlines, distance)
 
 
+def facet_coverage(spec: Spec, cells: Cells, facets: Facets) -> float:
+    """Coverage diameter that facets show, mm, as 32-bit floats hold them.
+
+    They cost most along the outline: of the facets there rays off both ends count.
+    """
+    outlines, pinhole = facets.outlines, np.array(spec.optics.camera_mm)
+    _, sides = cells.rings
+    arc = sides[rows_and_columns(outlines.segments[sides // 2])[0]] // 2
+    cut = (cells.arcs.faces[arc] == cells.seam).any(axis=1) & cells.halved[outlines.cell]
+    written = facets.vertices.astype(np.float32).astype(np.float64)
+    beside = written[facets.triangles[: len(arc)]][~cut]
+    a, b, c = beside.swapaxes(0, 1)
+    normal = unit(np.cross(b - a, c - a))
+    ends = written[np.stack([outlines.vertex, outlines.vertex[outlines.following]])][:, ~cut]
+    return 2 * float(miss_distances(pinhole, ends, normal).min())
+
+
+def check_coverage(spec: Spec, cells: Cells, facets: Facets) -> None:
+    """SpecError where facets of mirrors by rule traced show less than the capture sphere.
+
+    Facets under a coat are not what reflects, and are left to the verification.
+    """
+    if spec.mirrors.radius_rule != "traced" or spec.mirrors.coating_um:
+        return
+    wanted, margin = spec.optics.capture_diameter_mm, spec.mirrors.margin_mm
+    shown = facet_coverage(spec, cells, facets)
+    if shown < wanted:
+        enough = math.ceil((margin + wanted - shown) * MARGINS_PER_MM) / MARGINS_PER_MM
+        raise SpecError(
+            f"facets of the mirrors show {shown:.2f} mm, less than optics.capture_diameter_mm "
+            f"{wanted:g}: make mirrors.margin_mm {enough:g} instead of {margin:g}, or "
+            "mesh.ray_error_mm smaller"
+        )
+
+
 def _planar(outlines: CellOutlines) -> Facets:
     """Fans about the cells' middles: any triangulation of a plane is exact."""
     middle = means(outlines.points, outlines.cell)
@@ -106,6 +158,22 @@ def _spherical(spec: Spec, cells: Cells, outlines: CellOutlines, distance: Float
     strip = mirrors.projected(cell, strip_points(outlines, middle, outside, width))
     rings = np.ceil(farthest / np.sqrt(4 * spec.mesh.chord_error_mm * mirrors.radius))
     return _ringed(outlines, mirrors, middle, strip, rings.astype(np.int64))
+
+
+def check_folds(facets: Facets, mirrors: Surfaces) -> None:
+    """SpecError where a facet stands up from its sphere, and so folds the surface."""
+    a, b, c = facets.vertices[facets.triangles.T]
+    square = np.cross(b - a, c - a)
+    along = dot(square, mirrors.gradient(facets.mirror, a))
+    if np.all(along >= MIN_ALONG_SPHERE * norm(square)):
+        return
+    worst = int(np.argmin(along - MIN_ALONG_SPHERE * norm(square)))
+    longest = max(norm(side[worst]) for side in (b - a, c - b, a - c))
+    raise _bent_inward(
+        int(facets.mirror[worst]),
+        f"its facets would fold: one {longest:.2g} mm long is {norm(square[worst]) / longest:.2g} "
+        "mm wide",
+    )
 
 
 def _ringed(

@@ -24,11 +24,16 @@ def design_mandrel(design: MirrorDesign) -> Mandrel:
     return mandrel_of(design.spec.shell, array.modelled_cells, array.ellipsoid)
 
 
-def camera_a_mesh(design: MirrorDesign, envelope: Envelope | None = None) -> Mesh:
-    """Mesh of camera a's half; the envelope is worked out (or SpecError) where it is not given."""
+def camera_a_mesh(
+    design: MirrorDesign, envelope: Envelope | None = None, covers: bool = False
+) -> Mesh:
+    """Mesh of camera a's half; the envelope is worked out (or SpecError) where it is not given.
+
+    SpecError where its facets must cover the capture sphere and do not, or fold.
+    """
     array = design.arrays[0]
     envelope = envelope or shell_envelope(design)
-    return shell_mesh(design.spec, array.modelled_cells, envelope, array.apex_distance)
+    return shell_mesh(design.spec, array.modelled_cells, envelope, array.apex_distance, covers)
 
 
 def camera_a_mandrel_mesh(design: MirrorDesign, mandrel: Mandrel | None = None) -> Mesh:

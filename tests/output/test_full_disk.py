@@ -10,7 +10,7 @@ import pytest
 from tests.exported_files import contents
 
 WORDS = ["-m", "tbcad", "build", "--parts", "shell", "--no-verify", "--n", "4", "--out"]
-COARSE = ["--set", "mesh.ray_error_mm=1", "--set", "mesh.structure_error_mm=0.2"]
+COARSE = ["--set", "mesh.ray_error_mm=0.1", "--set", "mesh.structure_error_mm=0.2"]
 
 
 def build(folder: Path, largest: int) -> subprocess.CompletedProcess[str]:

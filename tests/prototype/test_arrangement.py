@@ -1,14 +1,19 @@
 """The arrangement of a prototype: every layout has room, and the spec's own values are kept."""
 
+from collections.abc import Iterator
+
 import pytest
 
 from tbcad.core.mirrors.array import MirrorDesign, design
+from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.load import load_spec, spec_dict
 from tbcad.core.spec.prototype import PAD_ANGLES_DEG, Hold
+from tbcad.prototype import arrangement
 from tbcad.prototype.arrangement import PrototypeModel, arrange, arrangements
 from tbcad.prototype.base.layout import base_layout
 from tbcad.prototype.base.solid import carrier_parts
+from tbcad.prototype.base.split import BedError
 from tbcad.prototype.drive.balance import ball_masses
 from tests.prototype.conftest import HEAVY
 
@@ -90,3 +95,20 @@ class TestRefused:
         fixed = MirrorDesign(spec, small_design.arrays)
         with pytest.raises(SpecError, match=r"tried: there is room with prototype\.k auto \(which"):
             arrange(fixed)
+
+
+def test_a_bed_that_is_too_small_for_several_ends_the_search(
+    small_design: MirrorDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each attempt takes seconds, and there are dozens."""
+    tried = []
+
+    def attempts(design: MirrorDesign) -> Iterator[tuple[Spec, SpecError]]:
+        for error in [SpecError("light"), *map(BedError, "abcdefg")]:
+            tried.append(str(error))
+            yield load_spec(None, ["prototype.k=3"]), error
+
+    monkeypatch.setattr(arrangement, "_attempts", attempts)
+    with pytest.raises(BedError, match=r"^a \(tried: 3 balls\)$"):
+        arrange(small_design)
+    assert tried == ["light", "a", "b", "c"]

@@ -7,7 +7,13 @@ from tbcad.core.optics.reflection import miss_distances
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.errors import SpecError
 from tbcad.shell.cell_outlines import CellOutlines
-from tbcad.shell.facets import Facets, middles, mirror_facets
+from tbcad.shell.facets import (
+    Facets,
+    check_coverage,
+    facet_coverage,
+    middles,
+    mirror_facets,
+)
 from tbcad.shell.halves import camera_a_mesh, shell_envelope
 from tests.mirror_arrays import mirror_design
 
@@ -128,3 +134,32 @@ def test_what_no_point_sees_whole_is_refused() -> None:
         SpecError, match=r"a0001 bends so far inward .* make optics\.semi_minor_mm larger"
     ):
         middles(*outline(corners))
+
+
+FOLDED = ["n=3", "camera_mm=[185.4, 0, -136.3]", "semi_minor_mm=51.4", "capture_diameter_mm=20"]
+
+
+def test_facets_that_would_fold_are_refused() -> None:
+    with pytest.raises(SpecError, match=r"a0026 .* facets would fold: one .* is 0\.00\d+ mm wide"):
+        camera_a_mesh(mirror_design(*FOLDED), covers=True)
+
+
+# As the verification found them on the files of these designs: by outlines on recovered spheres.
+@pytest.mark.parametrize(
+    ("margin", "ray_error", "shown"),
+    [(0.0, 0.05, 59.8285148), (0.1, 0.05, 59.9313265), (0.6, 1.0, 59.0979393)],
+)
+def test_what_facets_show_is_what_the_verification_finds(
+    margin: float, ray_error: float, shown: float
+) -> None:
+    mirrors = mirror_design("n=3", f"margin_mm={margin}", f"ray_error_mm={ray_error}")
+    facets, cells = facets_of(mirrors), mirrors.arrays[0].modelled_cells
+    assert facet_coverage(mirrors.spec, cells, facets) == pytest.approx(shown, abs=1e-5)
+    with pytest.raises(SpecError, match=rf"show {shown:.2f} mm, less than .* 60: make mirrors"):
+        check_coverage(mirrors.spec, cells, facets)
+
+
+def test_margins_that_an_error_names_are_enough() -> None:
+    for options in (["n=3", "margin_mm=0.2"], ["n=3"]):
+        mirrors = mirror_design(*options)
+        check_coverage(mirrors.spec, mirrors.arrays[0].modelled_cells, facets_of(mirrors))

@@ -9,6 +9,8 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.models import CommandInfo
 
+from tbcad.errors import InputError
+
 HEADINGS = {
     "Design and build": (
         *("init", "optimize", "build", "verify", "report", "picture", "camera"),
@@ -70,7 +72,15 @@ class Plain(TyperCommand):
         super().__init__(*arguments, **{**given, "rich_markup_mode": None})
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As TyperCommand, but with options under their former names too, each of which is told."""
+        """As TyperCommand, but with options under their former names too, each of which is told.
+
+        InputError: a name has one hyphen, of which click would make its first letter's option.
+        """
+        names = {name for one in self.params for name in (*one.opts, *one.secondary_opts)}
+        for word in args[: args.index("--")] if "--" in args else args:
+            given = word.partition("=")[0]
+            if f"-{given}" in names and given not in names:
+                raise InputError(f"{given}: an option's name has two hyphens: write -{given}")
         return super().parse_args(ctx, list(map(_renamed, args)))
 
 

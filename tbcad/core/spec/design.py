@@ -27,6 +27,7 @@ MAX_HFOV = 170  # degrees
 EdgeKind: TypeAlias = Literal["valley", "pedestal"]
 RadiusRule: TypeAlias = Literal["traced", "paper", "flat"]
 MAX_MARGIN = 20.0
+MAX_MESH_ERROR_MM = 0.5  # of what the verification recovers mirrors from
 MAX_MIRRORS = 50_000  # of one camera: more than n = 60 has
 Margin: TypeAlias = Annotated[float, Field(ge=0, le=MAX_MARGIN)]
 # Cured standard resins 1.15 to 1.2 g/cm^3 (data sheets); EN AW-6061 2.70 (EN 573-3).
@@ -181,7 +182,7 @@ class ShellSpec(Section):
 class MeshSpec(Section):
     """How fine the STL and 3MF are."""
 
-    ray_error_mm: float = Field(0.05, ge=0.01, le=10)
+    ray_error_mm: float = Field(0.05, ge=0.01, le=1)
     """How far a ray off a facet at a mirror's rim may miss, at the capture sphere, the ray off
     the exact sphere: a facet reflects like a flat mirror."""
     chord_error_mm: float = Field(0.015, ge=0.0002, le=1)
@@ -189,6 +190,16 @@ class MeshSpec(Section):
     counts."""
     structure_error_mm: float = Field(0.02, ge=0.002, le=5)
     """Distance of all other facets (back, flanges, holes) from the exact surface."""
+
+    @model_validator(mode="after")
+    def _fine_enough(self) -> Self:
+        for key in ("chord_error_mm", "structure_error_mm"):
+            if (error := getattr(self, key)) > MAX_MESH_ERROR_MM:
+                raise ValueError(
+                    f"{key} {error:g} is too coarse to tell mirrors from their mesh: make it "
+                    f"{MAX_MESH_ERROR_MM:g} or less"
+                )
+        return self
 
 
 class StepSpec(Section):

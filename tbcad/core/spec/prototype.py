@@ -5,7 +5,7 @@ from typing import Annotated, Literal, TypeAlias, get_args
 from pydantic import BeforeValidator, Field
 
 from tbcad.core.spec.errors import short_text
-from tbcad.core.spec.section import AUTO, OR_AUTO, Section, as_tuple
+from tbcad.core.spec.section import AUTO, OR_AUTO, Reason, Section, as_tuple
 
 MOST_BALLS = 1000
 LEAST_LEDS, MOST_LEDS = 4, 12
@@ -25,7 +25,7 @@ PAD_ANGLES_DEG = (50.0, 40.0, 30.0)  # tried in turn: flatter pads set a seat de
 HUB_BOSSES_MM = (20.0, 35.0, 50.0, 65.0)
 Lock: TypeAlias = Literal["set-screws", "clamp"]
 Magnets: TypeAlias = Annotated[
-    tuple[Annotated[float, Field(ge=1, le=50)], ...],
+    tuple[Annotated[float, Field(ge=2, le=50)], ...],
     Field(min_length=1, max_length=20),
     BeforeValidator(as_tuple),
 ]
@@ -78,7 +78,7 @@ class BaseSpec(Section):
     """Minimum distance of the carrier from all light."""
     clearance_mm: float = Field(0.5, ge=0.1, le=5)
     """Gap between a ball and its cup everywhere but at the pads."""
-    pad_mm: float = Field(3.0, ge=0.5, le=20)
+    pad_mm: float = Field(3.0, ge=1.3, le=20)
     """Diameter of the three pads that carry a ball; smaller for balls of less than 4.5 pads."""
     pad_offset_mm: float = Field(0.0, ge=-0.05, le=0.3)
     """By how much pads are printed off their places, away from the balls: the offset of the
@@ -86,9 +86,9 @@ class BaseSpec(Section):
     pad_angle_deg: Annotated[float, OR_AUTO] = Field(AUTO, ge=20, le=70)
     """Angle between a pad's normal and the axis of its seat; auto: the first of 50, 40 and 30 whose
     seats stay out of the light."""
-    cup_wall_mm: float = Field(2.5, ge=0.8, le=20)
+    cup_wall_mm: float = Field(2.5, ge=1.2, le=20)
     """Wall round a cup."""
-    floor_mm: float = Field(2.0, ge=0.6, le=20)
+    floor_mm: float = Field(2.0, ge=1.2, le=20)
     """Wall below a cup's pocket."""
     hold: Annotated[Hold, OR_AUTO] = AUTO
     """How a ball is held on its pads: by a magnet below it, or by glue in a well; auto: magnets
@@ -107,8 +107,10 @@ class BaseSpec(Section):
     cap_play_mm: float = Field(0.1, ge=0.02, le=0.5)
     """Play on the diameter of a cap's spigot in its seat, which lets the cap tilt: ream the
     seat's pocket and fit the spigot."""
-    digit_mm: float = Field(6.0, ge=3, le=30)
-    """Height of the digits in relief."""
+    digit_mm: Annotated[float, Reason("strokes are a fifth, and FDM prints 1.2")] = Field(
+        6.0, ge=6, le=30
+    )
+    """Height of the digits in relief; on small bosses only the last digit of a number fits."""
     relief_mm: float = Field(0.6, ge=0.2, le=3)
     """Height of the digits above the surface."""
     drive: Drive = "nema17-belt"
@@ -130,7 +132,7 @@ class BaseSpec(Section):
     """Height of these flanges above the wall."""
     screw_pitch_mm: float = Field(45.0, ge=12, le=500)
     """Approximate distance of the screws along a joint."""
-    dowel_mm: float = Field(3.0, ge=1, le=10)
+    dowel_mm: float = Field(3.0, ge=2, le=10)
     """Diameter of the dowel pins in the joints (ISO 8734), two to each."""
     dowel_press_mm: float = Field(0.1, ge=-0.5, le=1)
     """Play on the diameter of a dowel in the hole that holds it; printed holes come out smaller."""
@@ -224,9 +226,9 @@ class StageSpec(Section):
     """Current of an LED, at most; the resistor is the next larger of the series E24."""
     led_supply_v: float = Field(24.0, ge=3, le=48)
     """Voltage that LED and resistor are in series at."""
-    led_wall_mm: float = Field(1.3, ge=0.8, le=20)
+    led_wall_mm: float = Field(1.3, ge=1.2, le=20)
     """Wall round an LED's pocket."""
-    wire_mm: float = Field(2.4, ge=1, le=10)
+    wire_mm: float = Field(2.4, ge=2, le=10)
     """Width of the wires' channels."""
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
+from scipy.spatial import ConvexHull
 
 from tbcad.cad.kernel.checks import check_pads, closed_mesh, properties
 from tbcad.cad.kernel.glyphs import ROWS, relief, text_width
@@ -30,9 +31,13 @@ from tbcad.types import Floats
 # Of bars: in floors of a pocket, lower than one, so that they reach into no pocket; and at most.
 BAR_HEIGHT, BAR_MAX_MM = 0.8, 1.21
 BESIDE_TEXT_MM = 1.6  # of a bar
+BESIDE_FOOT_MM = (
+    1.0  # of a bar: a foot that stood out of its edge by less than a wall would be thin
+)
 GAP_MM = 3.0  # round texts and between seats
 SUNK_MM = 0.3  # of texts into their face
 DECIMALS = 6  # to which sizes are the same, mm
+STEPS = 65  # along each side of a seat's section
 
 
 @dataclass(frozen=True)
@@ -165,7 +170,7 @@ def _plates(rows: Iterable[CouponRow], printer: PrinterSpec) -> Iterator[list[li
 def _plate(
     name: str, seats: Seats, spec: BaseSpec, shelves: list[list[Place]], pose: SeatPose
 ) -> TopoDS_Solid:
-    bodies, contacts, pads = _bars(spec, shelves), [], []
+    bodies, contacts, pads = _bars(seats, spec, shelves, pose), [], []
     for row, corner in (place for shelf in shelves for place in shelf):
         k = row.seat
         bodies += _texts(row, spec, corner)
@@ -182,15 +187,33 @@ def _plate(
     return solid
 
 
-def _bars(spec: BaseSpec, shelves: list[list[Place]]) -> list[TopoDS_Shape]:
-    """A bar under each shelf, and one at the left that joins them, on the bed."""
+def _bars(
+    seats: Seats, spec: BaseSpec, shelves: list[list[Place]], pose: SeatPose
+) -> list[TopoDS_Shape]:
+    """A bar under each shelf, as wide as texts and feet, and one that joins them, on the bed."""
     half, up = _bar_width(spec) / 2, np.array([0, 0, _bar_height(spec)])
     middles = [float(corner[1]) for ((_, corner), *_) in shelves]
-    ends = [float(corner[0] + row.size[0]) - GAP_MM for (*_, (row, corner)) in shelves]
-    corners = [((0.0, y - half), (end, y + half)) for y, end in zip(middles, ends, strict=True)]
+    corners = []
+    for y, shelf in zip(middles, shelves, strict=True):
+        feet = [_foot(seats, spec, row, pose) for row, _ in shelf]
+        low, high = min(-half, *(one[0] for one in feet)), max(half, *(one[1] for one in feet))
+        row, last = shelf[-1]
+        corners.append(((0.0, y + low), (float(last[0] + row.size[0]) - GAP_MM, y + high)))
     corners.append(((0.0, middles[0] - half), (_bar_width(spec), middles[-1] + half)))
     flat = (np.column_stack([rectangle(low, high), np.zeros(4)]) for low, high in corners)
     return [prism(polygon(one), up) for one in flat]
+
+
+def _foot(seats: Seats, spec: BaseSpec, row: CouponRow, pose: SeatPose) -> tuple[float, float]:
+    """Ends of what a row's seats have below the bar's upper face, and beside it, from y, mm."""
+    section = outline(seats, spec, row.seat, pose.lean)
+    ring = section[ConvexHull(section).vertices]
+    along = (
+        ring[:, None] + np.linspace(0, 1, STEPS)[:, None] * (np.roll(ring, -1, 0) - ring)[:, None]
+    )
+    up = along[..., 1] + height(seats, spec, row.seat, pose)
+    y = along[..., 0][up <= _bar_height(spec)] + row.middle
+    return y.min(initial=0.0) - BESIDE_FOOT_MM, y.max(initial=0.0) + BESIDE_FOOT_MM
 
 
 def _texts(row: CouponRow, spec: BaseSpec, corner: Floats) -> list[TopoDS_Shape]:

@@ -153,7 +153,7 @@ def pad_normals(tilt: float, azimuth: Floats) -> Floats:
 
 def glue_wells(prototype: PrototypeLayout, needed: Floats, room: Floats) -> tuple[Floats, ...]:
     """As `magnet_pockets`, wells for glue; SpecError where glue holds a ball too little."""
-    radius = room / 2
+    radius = np.maximum(room, 0) / 2
     if (weak := glue_force(radius) < MIN_RATIO * needed).any():
         ball = first_ball(weak)
         raise SpecError(

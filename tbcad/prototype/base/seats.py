@@ -29,6 +29,7 @@ OFF_PATH_MM = 0.6  # minimum between a pad and the insertion path of another bal
 MIN_RIM_MM, RIM_POINTS = 1.4, 72  # of a cup beside the path of another ball
 ENOUGH_ROOM_MM = OFF_PATH_MM + 1  # beyond which more room makes no path or rotation better
 MAX_PAD = 2 / 3  # diameter of a pad in radii of its ball
+MIN_PAD_MM = 1.21  # FDM prints posts of 1.2 mm, and facets cut in by 2 um; glue needs what is left
 MIN_PAD_RELIEF = 0.8  # of the cup's clearance, by which pads stand out at their edges
 # A ball may be inserted at a slant, as long as it touches no pad of its own before its place.
 SLANTS = np.radians([0.0, 10.0, 20.0, 30.0])
@@ -95,7 +96,7 @@ def seat_layout(spec: BaseSpec, prototype: PrototypeLayout) -> Seats:
     """
     pad_angle = spec.pad_angles_deg[0]
     radius, tilt = prototype.balls.body_radius, float(np.radians(pad_angle))
-    pad = np.minimum(spec.pad_mm, MAX_PAD * radius) / 2
+    pad = np.clip(MAX_PAD * radius, MIN_PAD_MM, spec.pad_mm) / 2
     cup = radius + spec.clearance_mm
     front = radius * np.cos(tilt) - pad * np.sin(tilt) - LIP_MM
     _check_cups(spec, radius, pad, front, pad_angle)

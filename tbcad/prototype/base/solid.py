@@ -73,6 +73,7 @@ COLUMN_MM = 80.0  # length of the space that is kept free behind a boss
 RIB_ROOT = 0.6  # of the hub's radius, to where ribs go in it
 HEAD_MM = 7.0  # diameter of the flat for an M3 screw's head
 LABEL_ROOM = 0.85  # of a boss's end
+MIN_DIGIT_MM = 6.0  # whose strokes, a fifth of it, FDM prints
 STEP_MM, END_STEPS = 0.25, 4
 ROOM_MM = 1.0  # round the end of a boss
 MIN_PART_MM = 8.0  # of a rib or ring between gaps
@@ -396,10 +397,18 @@ def _runs(at: Floats, free: Bools, shortest: float) -> list[tuple[float, float]]
 
 
 def _number(base: BaseLayout, seats: Seats, k: int) -> list[TopoDS_Shape]:
-    """The ball's number, from 1, on the end of its boss; its top is toward the camera."""
-    text, spec = str(k + 1), base.spec
+    """The ball's number, from 1, on the end of its boss; its top is toward the camera.
+
+    Of a number whose strokes would be too thin to print the last digit, which parts neighbours; of
+    a boss too small for that nothing.
+    """
+    spec, room = base.spec, LABEL_ROOM * float(seats.boss[k])
     up, _, out = seats.axes[k]
-    height = fitting_height(text, spec.digit_mm, LABEL_ROOM * float(seats.boss[k]))
+    for text in (str(k + 1), str(k + 1)[-1]):
+        if (height := fitting_height(text, spec.digit_mm, room)) >= MIN_DIGIT_MM:
+            break
+    else:
+        return []
     axes = np.stack([np.cross(up, out), up, out])
     at = seats.centre[k] + seats.back[k] * out
     return relief(text, height, spec.relief_mm, SUNK_MM, axes, at)

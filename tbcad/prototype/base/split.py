@@ -49,6 +49,10 @@ STEP_MM = 4.0  # maximum distance of points along a line
 RIM_CORNERS = 24
 
 
+class BedError(SpecError):
+    """The printer's bed is too small for a base, however it is cut."""
+
+
 @dataclass(frozen=True)
 class BaseSplit:
     """Pieces and joints of the base."""
@@ -67,7 +71,7 @@ UNCUT = BaseSplit((WHOLE,), ())
 def split_base(base: BaseLayout, printer: PrinterSpec) -> BaseSplit:
     """How a base is cut so that every piece fits the bed: into as few as can be found.
 
-    SpecError when no cut does; it names the bed that would.
+    BedError when no cut does; it names the bed that would.
     """
     search = _SplitSearch(base, printer)
     if search.shortfall(WHOLE) <= 0:
@@ -76,7 +80,7 @@ def split_base(base: BaseLayout, printer: PrinterSpec) -> BaseSplit:
     for count in range(2, MAX_PIECES + 1):
         for split in search.splits(count):
             return split
-    raise SpecError(
+    raise BedError(
         "no way was found to cut the base for the printer's bed: make printer.bed_mm at least "
         f"{size_text(search.min_bed())}, or prototype.largest_ball_mm or prototype.k smaller"
     )

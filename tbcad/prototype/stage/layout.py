@@ -40,6 +40,8 @@ from tbcad.types import Floats
 MAX_NECK_MM = 6.0  # radius of the crown's neck where it leaves the sphere
 NECK_SHARE = 0.95  # of the radius at which light grazes the sphere's bottom
 NECK_OF_POST = 0.65  # largest share of the post's radius
+WALL_MM = 1.3  # of the neck: FDM prints 1.2, three lines of a nozzle of 0.4 mm, and chords cut in
+MIN_BORE_MM = 1.0  # radius of a hole that FDM prints
 BELOW_MM = 1.5  # length of the neck below the sphere
 WIRES_UP_MM = 8.0  # of the wires' hole above the clamp
 SHELF_MM = 1.0  # smallest width of the crown's plate beyond the neck
@@ -71,17 +73,13 @@ def stage_layout(
     stage = spec.stage
     widest = _widest_tube(spec, parts)
     post = widest["outer_mm"] / 2
+    led, leds = parts[stage.led], np.array(stage.leds_mm).reshape(-1, 3)
     neck = min(
         MAX_NECK_MM,
         NECK_SHARE * _grazing_radius(prototype, keep_out.capture),
         NECK_OF_POST * post,
     )
-    if neck <= 0:
-        raise SpecError(
-            "light of the balls crosses the axis under the object, where the stage's neck would "
-            "be: make prototype.k another, or optics.capture_diameter_mm larger"
-        )
-    led, leds = parts[stage.led], np.array(stage.leds_mm).reshape(-1, 3)
+    wire = bore_radius(neck, len(leds) > 0)
     plate = stage.top_mm - DISC_MM
     pockets = leds[:, 2] - (led["height_mm"] - led["diameter_mm"] / 2)
     joint = -keep_out.capture - BELOW_MM - (post - neck) - SHOULDER_MM
@@ -89,7 +87,7 @@ def stage_layout(
         plate=plate,
         rim=_rim(stage, keep_out.capture, plate, neck),
         neck=neck,
-        wire=neck / 2 if len(leds) else 0.0,
+        wire=wire,
         post=post,
         wall=widest["wall_mm"],
         joint=joint,
@@ -108,6 +106,22 @@ def stage_layout(
     column = post_component(sizes, tube, foot, foot + wires_up(clamp))
     light, swept = _check_clearances((*components, column), keep_out, spec.frame.clearance_mm)
     return StageLayout(sizes, foot, led, leds, components, column, clamp, light, swept)
+
+
+def bore_radius(neck: float, wired: bool) -> float:
+    """Radius of the wires' bore in a neck of a radius, mm, 0 without wires.
+
+    SpecError: light leaves too little room for a neck whose walls can be printed.
+    """
+    bore = min(neck / 2, neck - WALL_MM) if wired else 0.0
+    least = WALL_MM + MIN_BORE_MM if wired else WALL_MM / 2
+    if neck < least:
+        raise SpecError(
+            f"light of the balls leaves a neck of {max(2 * neck, 0):.1f} mm diameter under the "
+            f"object, and one that can be printed has {2 * least:.1f}: make prototype.k another, "
+            "or optics.capture_diameter_mm or prototype.post_diameter_mm larger"
+        )
+    return bore
 
 
 def wires_up(clamp: PurchasedPart) -> float:

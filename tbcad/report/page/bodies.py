@@ -156,7 +156,10 @@ def _balls(folder: Path) -> list[dict[str, Any]]:
 Record = dict[str, Any]
 
 # Display only, for the outlines of mirrors and the casing.
-COARSE = MeshSpec(ray_error_mm=10.0, chord_error_mm=1.0, structure_error_mm=0.2)
+# Coarser than a design may ask for.
+COARSE = MeshSpec().model_copy(
+    update={"ray_error_mm": 10.0, "chord_error_mm": 1.0, "structure_error_mm": 0.2}
+)
 STEPS = 65_535  # of positions along a body's longest side
 # In the exploded view: static parts are moved away from the object by this share of their
 # distance, balls and caps out of their seats by so many radii of the capture sphere, fasteners

@@ -92,6 +92,17 @@ def test_former_names_of_options_are_told_and_still_taken(cli: Command) -> None:
     assert said.startswith("tbcad: --chain is called --process now\n")
 
 
+@pytest.mark.parametrize(
+    ("words", "named"), [(("-out", "x"), "--out"), (("-dry-run",), "--dry-run")]
+)
+def test_a_name_with_one_hyphen_is_refused_by_its_right_name(
+    words: tuple[str, ...], named: str, cli: Command
+) -> None:
+    """Of -out click makes -o with the folder ut."""
+    said = cli("build", *words, code=2).err
+    assert said == f"tbcad: {named[1:]}: an option's name has two hyphens: write {named}\n"
+
+
 def test_a_study_as_json(cli: Command, tmp_path: Path) -> None:
     words = ("study", "elevation", "--set", "n=4", "--json", "--out", tmp_path)
     record: dict[str, Any] = json.loads(cli(*words).out)

@@ -19,7 +19,14 @@ from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.keepout import EXACT, EXACT_MM, KeepOut, SweptSection, min_distance
 from tbcad.prototype.purchased.parts import load_parts
-from tbcad.prototype.stage.layout import GRAZING_MM, StageLayout, led_poses, stage_layout
+from tbcad.prototype.stage.layout import (
+    GRAZING_MM,
+    WALL_MM,
+    StageLayout,
+    bore_radius,
+    led_poses,
+    stage_layout,
+)
 from tbcad.prototype.stage.leds import (
     MIN_SEEN,
     NOISE_PX,
@@ -227,3 +234,12 @@ def test_the_covariance_is_that_of_centres_solved_from_noisy_highlights() -> Non
     many = calibration_estimate(SIZED.stage, array, more, CAPTURE)
     assert (many.worst <= estimate.worst * (1 + 1e-9)).all()
     assert many.record().centre_um_median < estimate.record().centre_um_median
+
+
+def test_walls_of_the_neck_can_be_printed() -> None:
+    assert bore_radius(6.0, True) == 3.0
+    assert bore_radius(2.4, True) == pytest.approx(2.4 - WALL_MM)
+    assert bore_radius(0.7, False) == 0.0
+    for neck, wired in ((2.2, True), (0.6, False), (-0.1, False)):
+        with pytest.raises(SpecError, match=r"leaves a neck of \d\.\d mm diameter"):
+            bore_radius(neck, wired)

@@ -219,3 +219,11 @@ def test_rows_are_json_and_the_same_every_time() -> None:
     assert row["wall_mm"] is row["hole_mm"] is None
     json.dumps(row, allow_nan=False)
     assert print_check(found, required=True).passed is False
+
+
+def test_a_dimple_that_a_machine_may_leave_out_is_no_hole() -> None:
+    """A plate with a hole of 1 mm through it, thicker or thinner than the tolerance of 0.3."""
+    for thickness, holes in ((2.0, 1), (0.2, 0)):
+        pierced = shape(plate(rectangle(30, 20), [ring(0.5, 32)], thickness))
+        found = [one for one in assess("p.stl", pierced, fdm()).problems if "hole" in one]
+        assert len(found) == holes

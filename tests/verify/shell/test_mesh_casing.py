@@ -140,15 +140,19 @@ def test_without_holes_or_mirrors_it_is_unknown(
 
 
 @pytest.mark.parametrize("number", [0, 1])
-def test_valleys_are_corners_of_two_mirrors_or_more(setup: OpticalSetup, number: int) -> None:
+def test_valleys_are_corners_of_mirrors_with_each_other_or_joining_faces(
+    setup: OpticalSetup, number: int
+) -> None:
     """The sample's mirrors are planes."""
     mirrors = setup.export.mirrors
     mine = mirrors.camera == setup.export.parts[number].camera
     apex, normal = (mirrors.columns(key, 3)[:, mine] for key in ("px", "nx"))
     valleys = find_valleys(setup, number)
     height = np.abs(normal.T @ valleys.point - (normal * apex).sum(axis=0)[:, None])
-    assert ((height < 1e-4).sum(axis=0) >= 2).all()
     low = valleys.point[2] - setup.export.foot_z_mm
-    joining = np.minimum(np.abs(valleys.point[0]), low) < 1e-4
+    planes = np.abs([valleys.point[0], low]) < 1e-4
+    mirrors_at, joining = (height < 1e-4).sum(axis=0), planes.any(axis=0)
+    assert (mirrors_at >= 1).all()
+    assert (mirrors_at + planes.sum(axis=0) >= 3).all()
     assert (valleys.inner == ~joining).all()
     assert joining.any()

@@ -36,11 +36,6 @@ class RoundHoles:
     wall: Ints  # the facets of all their walls, ascending
 
     @property
-    def smallest(self) -> int | None:
-        """Index of the hole with the smallest diameter; None without holes."""
-        return int(self.diameter.argmin()) if self.diameter.size else None
-
-    @property
     def each(self) -> list[Hole]:
         """The holes one by one."""
         rows = zip(self.middle.T, self.axis.T, self.diameter / 2, self.depth, strict=True)

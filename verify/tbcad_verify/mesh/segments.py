@@ -107,6 +107,11 @@ def count_folds(edges: Edges, nearest: float = FOLD_RAD) -> int:
     return int(turned.sum())
 
 
+def total_bend(mesh: Mesh, edges: Edges) -> float:
+    """Sum over edges of length times angle, as `MassProperties.bend` is, mm."""
+    return float((norm(half_edge_vectors(mesh, edges.half)[1]) * np.abs(edges.angle)).sum())
+
+
 def segment_mesh(mesh: Mesh, edges: Edges) -> Segmentation:
     """Join facets over all edges that are no creases."""
     smooth = edges.half[~creases(mesh, edges)]

@@ -65,7 +65,7 @@ def to_row(one: PrintAssessment) -> dict[str, Any]:
     measures, pose, overhang = one.measures, one.placement.pose, one.placement.overhang
     mass, walls, holes = measures.mass, measures.walls, measures.holes
     wall = finite(walls.minimum)
-    smallest = holes.smallest
+    smallest = _smallest_hole(measures, one.profile)
     return {
         "part": one.part,
         "profile": one.profile.name,
@@ -148,10 +148,9 @@ def _mesh_problems(measures: PartMeasures, profile: Profile) -> Iterator[str]:
 def _size_problems(
     measures: PartMeasures, profile: Profile, placement: BedPlacement
 ) -> Iterator[str]:
-    walls, holes = measures.walls, measures.holes
+    walls, holes, k = measures.walls, measures.holes, _smallest_hole(measures, profile)
     if walls.minimum < profile.wall_mm - SLACK_MM:
         yield f"minimum wall {_against(walls.minimum, profile.wall_mm)}, {_at(walls.where)}"
-    k = holes.smallest
     if k is not None and holes.diameter[k] < profile.hole_mm - SLACK_MM:
         hole = _against(float(holes.diameter[k]), profile.hole_mm)
         yield f"smallest hole {hole}, {_at(holes.middle[:, k])}"
@@ -161,6 +160,16 @@ def _size_problems(
             f"{placement.pose.excess:.2f} mm too large: {size} with {pose_text(placement.pose)}, "
             f"the bed is {bed} less {profile.clearance_mm:g} at the rim"
         )
+
+
+def _smallest_hole(measures: PartMeasures, profile: Profile) -> int | None:
+    """Index of the smallest hole that is deeper than the machine's tolerance, None without one.
+
+    A dimple that a machine may leave out is no hole: the flat at a cup's bottom is 2 um deep.
+    """
+    holes = measures.holes
+    deep = np.flatnonzero(holes.depth > profile.tolerance_mm)
+    return int(deep[holes.diameter[deep].argmin()]) if deep.size else None
 
 
 def _against(measured: float, required: float) -> str:

@@ -16,9 +16,8 @@ from tbcad_verify.mesh.mesh import (
     mass_properties,
     mesh_from_facets,
 )
-from tbcad_verify.mesh.segments import Edges, count_folds, half_edge_vectors, measure_edges
+from tbcad_verify.mesh.segments import Edges, count_folds, measure_edges, total_bend
 from tbcad_verify.mesh.stl import Facets
-from tbcad_verify.mesh.vectors import norm
 from tbcad_verify.record.prototype import PrintedPart
 from tbcad_verify.report.checks import (
     Check,
@@ -77,9 +76,7 @@ def measure_part(part: PrintedPart, facets: Facets) -> MeasuredPart:
         edges = measure_edges(mesh)
         topology = examine_topology(mesh, facets)
         placed = put_back(mesh, part)
-        length = norm(half_edge_vectors(mesh, edges.half)[1])
-        bend = float((length * np.abs(edges.angle)).sum())
-        placed_mass = replace(mass_properties(placed), bend=bend)
+        placed_mass = replace(mass_properties(placed), bend=total_bend(mesh, edges))
     except Exception as error:
         reason = reason_of(error)
         return MeasuredPart(part, [unknown(name, reason) for name in solid + pose], reason)

@@ -131,7 +131,7 @@ class BaseSpec(Strict):
     magnet_play_mm: float = Field(ge=0, le=1)
     drive: Literal["nema17-belt", "nema17-direct", "stage-60"]
     insert_hole_mm: float = Field(ge=2, le=10)
-    dowel_mm: float = Field(ge=1, le=10)
+    dowel_mm: float = Field(ge=2, le=10)
     dowel_press_mm: float = Field(ge=-0.5, le=1)
     dowel_slip_mm: float = Field(ge=0, le=1)
     coupon_offsets_mm: list[Annotated[float, Field(ge=-1, le=1)]] = Field(

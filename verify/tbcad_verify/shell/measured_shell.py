@@ -22,7 +22,7 @@ from tbcad_verify.mesh.mesh import (
     mesh_from_facets,
 )
 from tbcad_verify.mesh.rays import in_threads
-from tbcad_verify.mesh.segments import Edges, measure_edges
+from tbcad_verify.mesh.segments import Edges, measure_edges, total_bend
 from tbcad_verify.mesh.stl import Facets
 from tbcad_verify.mesh.surfaces import Surfaces
 from tbcad_verify.printing.orientations import part_hull
@@ -92,6 +92,8 @@ def _measure_shell(export: Export, part: Part, facets: Facets) -> ShellPart:
     topology, no_topology = attempt(lambda: examine_topology(known(), facets))
     mass, no_mass = attempt(lambda: mass_properties(known()))
     edges, _ = attempt(lambda: measure_edges(known()))
+    if mass and edges and mesh and export.spec.shell.edges == "pedestal":  # walls lose along edges
+        mass = replace(mass, bend=total_bend(mesh, edges))
     recovery, no_recovery = attempt(
         lambda: recover(known(), pinhole_of(export, part), export.target_mm / 2, edges)
     )

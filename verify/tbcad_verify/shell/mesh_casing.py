@@ -51,7 +51,7 @@ CHECKS = {"mesh wall": "mm", "mesh holes": "faults"}
 class Valleys:
     """Corners of one part's mesh where mirrors meet, or the walls of their pedestals."""
 
-    point: Floats  # (3, V) mm; of grooves between mirrors, their bottoms
+    point: Floats  # (3, V) mm; of joining faces, where mirrors end; of grooves, their bottoms
     inner: Bools  # (V,) whether only mirrors meet there, and no joining face
 
 
@@ -159,15 +159,18 @@ def _of_part(setup: OpticalSetup, number: int, round_holes: RoundHoles | None) -
 
 
 def find_valleys(setup: OpticalSetup, number: int) -> Valleys:
-    """Corners of edges that have another mirror of the part on each side, or grooves' bottoms."""
+    """Corners of mirrors' outlines, at other mirrors and joining faces; or the bottoms of grooves.
+
+    Only a mirror's corner on both joining faces may be deeper than where mirrors meet.
+    """
     mesh, label = setup.mesh, setup.recovery.segments.label
     mine = setup.part[label] == number
     mirror = np.where(mine, setup.owner()[label], -1)
     half = np.flatnonzero(np.repeat(mirror >= 0, 3) & (mesh.twin >= 0))
     one, two = mirror[half // 3], mirror[mesh.twin[half] // 3]
-    half = half[(two >= 0) & (one != two)]
-    if not half.size:
+    if not np.any((two >= 0) & (one != two)):
         return _grooves(setup, mine, mirror >= 0)
+    half = half[one != two]
     corner = np.unique(mesh.faces[half // 3, half % 3])
     joining = np.zeros(len(mesh.points), dtype=np.bool_)
     joining[mesh.faces[mine & (mirror < 0)]] = True
