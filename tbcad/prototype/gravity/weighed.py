@@ -50,6 +50,10 @@ HOLDING = (HEAD, SHAFT, *UPRIGHTS, *BEARINGS)
 X = np.array([1.0, 0.0, 0.0])
 
 
+# Last digits of linear algebra follow from processor and threads: rounded off, they move no seat.
+DECIMALS_MM, DECIMALS_RAD = 6, 9
+
+
 @dataclass(frozen=True)
 class WeighedBase:
     """A base, its weight and its supports, in the base's frame at angle zero."""
@@ -114,7 +118,8 @@ def sag_of(base: WeighedBase) -> Sag:
     turns = base.angle, -base.axes[:, 2]
     for name, flexible in _holding(base, held.start).items():
         of[name] = moved_by(flexible, held.start, base.bodies.centre, base.load, turns)
-    return replace(sag, of=of, seat_turn=of_carrier[..., 3:])
+    rounded = {name: one.round(DECIMALS_MM) for name, one in of.items()}
+    return replace(sag, of=rounded, seat_turn=of_carrier[..., 3:].round(DECIMALS_RAD))
 
 
 def _shaft_radius(solids: dict[str, Trimesh]) -> float:

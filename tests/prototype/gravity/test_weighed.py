@@ -8,6 +8,7 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.prototype.arrangement import PrototypeModel, arrange
 from tbcad.prototype.base.solid import carrier_solid
 from tbcad.prototype.files.tables import ball_rows
+from tbcad.prototype.gravity import weighed
 from tbcad.prototype.gravity.weighed import against_weight, sag_of, weighed_base
 
 
@@ -39,6 +40,20 @@ def test_seats_in_other_places_sag_as_much(placed: PrototypeModel) -> None:
     assert placed.sag is not None
     again = sag_of(weighed_base(placed))
     assert norm(again.whole - placed.sag.whole).max() < 0.02 * norm(again.whole).max()
+
+
+def test_last_digits_of_linear_algebra_move_no_seat(
+    model: PrototypeModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    base = weighed_base(model)
+    sag = sag_of(base)
+    for name in ("sag_of_bodies", "compliance"):
+        solved = getattr(weighed, name)
+        other = lambda *given, of=solved: of(*given) * (1 + 1e-14)  # noqa: E731
+        monkeypatch.setattr(weighed, name, other)
+    again = sag_of(base)
+    assert all(np.array_equal(again.of[name], moved) for name, moved in sag.of.items())
+    assert np.array_equal(again.seat_turn, sag.seat_turn)
 
 
 def test_the_rest_of_the_design_stays(model: PrototypeModel, placed: PrototypeModel) -> None:
