@@ -38,7 +38,7 @@ def _no_work(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     def begun(*_: object, **__: object) -> None:
         raise InputError("all options are allowed")
 
-    for name in ("build", "photograph", "analyse", "verify", "simulate_run"):
+    for name in ("builds.build_planned", "photograph", "analyse", "verify", "simulate_run"):
         monkeypatch.setattr(f"tbcad.app.api.{name}", begun)
     monkeypatch.setattr("tbcad.tolerancing.process_design.edges_for_process", begun)
     monkeypatch.setattr(sys.modules["tbcad.app.cli.app"], "stages", begun)
