@@ -50,8 +50,7 @@ HOLDING = (HEAD, SHAFT, *UPRIGHTS, *BEARINGS)
 X = np.array([1.0, 0.0, 0.0])
 
 
-# Last digits of linear algebra follow from processor and threads: rounded off, they move no seat.
-DECIMALS_MM, DECIMALS_RAD = 6, 9
+STEPS = np.repeat([1e-6, 1e-9], 3)  # of shifts, mm, and turns, radians
 
 
 @dataclass(frozen=True)
@@ -113,13 +112,12 @@ def sag_of(base: WeighedBase) -> Sag:
     held = Axle(X * carrier.bounds[0, 0], X * shaft.bounds[1, 0], _shaft_radius(base.solids))
     moved = sag_of_bodies(carrier, base.bodies, held, base.material)
     sag = Sag(base.angle, base.bodies.centre, base.axes, {}, np.empty(0))
-    of_carrier = np.einsum("kag,sg->ska", moved, sag.gravity)
+    of_carrier = _rounded(np.einsum("kag,sg->ska", moved, sag.gravity))
     of = {CARRIER: of_carrier[..., :3]}
     turns = base.angle, -base.axes[:, 2]
     for name, flexible in _holding(base, held.start).items():
         of[name] = moved_by(flexible, held.start, base.bodies.centre, base.load, turns)
-    rounded = {name: one.round(DECIMALS_MM) for name, one in of.items()}
-    return replace(sag, of=rounded, seat_turn=of_carrier[..., 3:].round(DECIMALS_RAD))
+    return replace(sag, of=of, seat_turn=of_carrier[..., 3:])
 
 
 def _shaft_radius(solids: dict[str, Trimesh]) -> float:
@@ -187,7 +185,12 @@ def moved_by(
     angle, down = turns
     arm = rotated_about_x(np.broadcast_to(load[0], (len(angle), 3)), angle) - hub
     force = np.broadcast_to(load[1] * N_PER_G * down, arm.shape)
-    motion = np.concatenate([force, np.cross(arm, force)], axis=1) @ flexible
+    motion = _rounded(np.concatenate([force, np.cross(arm, force)], axis=1) @ flexible)
     place = rotated_about_x(np.broadcast_to(centre, (len(angle), *centre.shape)), angle[:, None])
     moved = motion[:, None, :3] + np.cross(motion[:, None, 3:], place - hub)
     return rotated_about_x(moved, -angle[:, None])
+
+
+def _rounded(motions: Floats) -> Floats:
+    """Shifts and turns (..., 6) in steps: last digits of linear algebra follow from its threads."""
+    return np.asarray(np.rint(motions / STEPS) * STEPS)
