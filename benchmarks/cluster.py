@@ -106,6 +106,7 @@ def cluster(workers: int, processes: bool = False) -> Iterator[str]:
         processes=processes,
         threads_per_worker=1,
         protocol="tcp",
+        memory_limit=0,  # by default its 64th part, beyond which workers of one process pause
         dashboard_address=":0",
     )
     try:

@@ -31,9 +31,7 @@ from tbcad.types import Floats
 # Of bars: in floors of a pocket, lower than one, so that they reach into no pocket; and at most.
 BAR_HEIGHT, BAR_MAX_MM = 0.8, 1.21
 BESIDE_TEXT_MM = 1.6  # of a bar
-BESIDE_FOOT_MM = (
-    1.0  # of a bar: a foot that stood out of its edge by less than a wall would be thin
-)
+BESIDE_FOOT_MM = 1.0  # of a bar: what stood out of its edge by less than a wall would be thin
 GAP_MM = 3.0  # round texts and between seats
 SUNK_MM = 0.3  # of texts into their face
 DECIMALS = 6  # to which sizes are the same, mm
