@@ -79,7 +79,7 @@ class Plain(TyperCommand):
         names = {name for one in self.params for name in (*one.opts, *one.secondary_opts)}
         for word in args[: args.index("--")] if "--" in args else args:
             given = word.partition("=")[0]
-            if f"-{given}" in names and given not in names:
+            if given[:1] == "-" and f"-{given}" in names and given not in names:
                 raise InputError(f"{given}: an option's name has two hyphens: write -{given}")
         return super().parse_args(ctx, list(map(_renamed, args)))
 
