@@ -94,7 +94,7 @@ def test_former_names_of_options_are_told_and_still_taken(cli: Command) -> None:
 
 def test_a_folder_may_have_the_name_of_an_option(cli: Command) -> None:
     said = cli("build", "-n", "99", "--out", "n", code=2).err
-    assert said.startswith("tbcad: optics.n is 99")
+    assert "optics.n is 99" in said
 
 
 @pytest.mark.parametrize(
