@@ -116,10 +116,23 @@ def run_units(
         # The work is sent once, as a task of its own: if all that hold it die, it is made again.
         on_worker = partial(_on_worker, work, expected=versions(), scheduler=scheduler)
         shared = client.submit(pickle.loads, dumps(on_worker), pure=False)
-        futures = [client.submit(call, shared, unit, pure=False, retries=RETRIES) for unit in units]
+        _spread(client, shared, patience)
+        # In one graph: of units that come one by one the first all go to one worker.
+        each = [shared] * len(units), units
+        futures = client.map(call, *each, pure=False, retries=RETRIES)
         # However this ends, by an interrupt too: the client goes, and what is not done is dropped.
         check = _worker_check(client, scheduler, patience)
         return _gathered(client, futures, units, progress, check)
+
+
+def _spread(client: Any, shared: Any, patience: float) -> None:
+    """Let every worker have the work: units go to those that do, and few units to one of them."""
+    from distributed import wait as wait_for
+
+    with suppress(TimeoutError):  # what is wrong with the cluster, the check of workers tells
+        wait_for(shared, timeout=patience)
+        if shared.status == "finished":
+            client.replicate([shared], callback_timeout=patience)
 
 
 _CLIENTS: ContextVar[dict[str, Any] | None] = ContextVar("clients", default=None)

@@ -246,6 +246,16 @@ class TestCluster:
         assert run_units(work, [3], standing.address) == [drawn(3)]  # one of its own
         assert len(opened) == 2
 
+    def test_a_unit_for_each_worker_goes_to_each(self, standing: Cluster) -> None:
+        def work(_: int) -> int:
+            import os
+            import time
+
+            time.sleep(0.2)
+            return os.getpid()
+
+        assert len(set(run_units(work, range(2), standing.address))) == 2
+
     @pytest.mark.slow
     def test_by_tls(self, tmp_path: Path) -> None:
         dask = pytest.importorskip("distributed").client.dask
