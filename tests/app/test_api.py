@@ -91,7 +91,7 @@ def test_example_of_the_readme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.slow
 def test_printed_parts_are_valid_and_assembled() -> None:
     """The post stands on the axis of the object, below it; the carrier is above the base plate."""
-    design = tbcad.design(n=3, settings={"capture_diameter_mm": "35", "prototype.k": "3"})
+    design = tbcad.design(n=3, settings={"capture_diameter_mm": "35", "prototype.k": "4"})
     parts = design.printed_parts()
     assert {"carrier", "bearing_head", "camera_bracket"} <= set(parts)
     assert all(part.is_valid and part.volume > 0 for part in parts.values())

@@ -19,7 +19,7 @@ from tbcad.errors import InputError
 
 EDITS = 20
 SMALL = (
-    *("optics.n=3", "optics.capture_diameter_mm=35", "prototype.k=3"),
+    *("optics.n=3", "optics.capture_diameter_mm=35", "prototype.k=4"),
     *("camera.width_px=416", "camera.height_px=310"),
 )
 # Keys of a sequence, each with values that fit all others.
@@ -27,7 +27,7 @@ VALUES = {
     "prototype.stage.led_ma": (8, 10, 12),
     "prototype.light.segments": (1, 2),
     "prototype.frame.camera_travel_mm": (20, 25),
-    "prototype.base.digit_mm": (5, 6),
+    "prototype.base.digit_mm": (6, 7),
     "mesh.structure_error_mm": (0.02, 0.03),
     "name": ('"one"', '"two"'),
 }

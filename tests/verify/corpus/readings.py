@@ -204,7 +204,7 @@ def _traced_key(measured: MeasuredPrototype, *_: object) -> object:
     context = measured.context
     return (
         *(measured.centre, measured.radius, measured.seated, context.angle, context.ball),
-        *(context.stop, context.sag_at_stops),
+        *(context.stop, context.sag_at_stops, context.told_sag),
         *(measured.rotating.scene, measured.fixed.scene),
         *(context.export.mirrors.columns("ux", 15), context.camera),
         *(context.export.target_mm, context.export.foot_z_mm),
