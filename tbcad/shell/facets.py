@@ -50,7 +50,8 @@ def middles(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
     """
     every, cell, edge = np.arange(len(mirrors)), outlines.cell, outlines.points
     middle = mirrors.projected(every, means(edge, cell))
-    inward = _inward(outlines, mirrors)
+    outside = -mirrors.gradient(cell, edge)
+    inward = unit(np.cross(outside, edge[outlines.following] - edge))
     for _ in range(ROUNDS):
         hidden = np.unique(cell[dot(inward, middle[cell] - edge) <= 0])
         if not len(hidden):
@@ -61,13 +62,6 @@ def middles(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
             middle[k] += _deepest_step(middle[k], axes, *lines)
         middle = mirrors.projected(every, middle)
     raise _bent_inward(int(hidden[0]), "no point of the mirror sees its whole outline")
-
-
-def _inward(outlines: CellOutlines, mirrors: Surfaces) -> Floats:
-    """Unit vectors (b, 3) square to the outlines' segments, into their cells."""
-    cell, edge = outlines.cell, outlines.points
-    outside = -mirrors.gradient(cell, edge)
-    return unit(np.cross(outside, edge[outlines.following] - edge))
 
 
 def _bent_inward(mirror: int, effect: str) -> SpecError:
@@ -164,10 +158,10 @@ def check_folds(facets: Facets, mirrors: Surfaces) -> None:
     """SpecError where a facet stands up from its sphere, and so folds the surface."""
     a, b, c = facets.vertices[facets.triangles.T]
     square = np.cross(b - a, c - a)
-    along = dot(square, mirrors.gradient(facets.mirror, a))
-    if np.all(along >= MIN_ALONG_SPHERE * norm(square)):
+    along = dot(square, mirrors.gradient(facets.mirror, a)) - MIN_ALONG_SPHERE * norm(square)
+    worst = int(along.argmin())
+    if along[worst] >= 0:
         return
-    worst = int(np.argmin(along - MIN_ALONG_SPHERE * norm(square)))
     longest = max(norm(side[worst]) for side in (b - a, c - b, a - c))
     raise _bent_inward(
         int(facets.mirror[worst]),

@@ -48,9 +48,8 @@ CARRIER, HEAD, SHAFT = "carrier", "bearing_head", "shaft"
 UPRIGHTS, BEARINGS = ("upright_left", "upright_right"), ("bearing_front", "bearing_rear")
 HOLDING = (HEAD, SHAFT, *UPRIGHTS, *BEARINGS)
 X = np.array([1.0, 0.0, 0.0])
-
-
-STEPS = np.repeat([1e-6, 1e-9], 3)  # of shifts, mm, and turns, radians
+# Of shifts, mm, and turns, radians, by weight: finer than any model of it is true.
+STEPS = np.repeat([1e-6, 1e-9], 3)
 
 
 @dataclass(frozen=True)
