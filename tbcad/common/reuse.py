@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from time import time
 
-from tbcad_verify.run.kept import Store, keeping, kept
+from tbcad_verify.run.kept import Store, is_own, keeping, kept
 
 from tbcad.errors import InputError
 from tbcad.version import LOADED
@@ -88,8 +88,8 @@ def _folder() -> Path | None:
     except OSError:
         return None
     # Results are read by pickle: what another user could have put there may do anything.
-    own = not hasattr(os, "getuid") or found.st_uid == os.getuid()
-    return place if own and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else None
+    closed = not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return place if is_own(found) and closed else None
 
 
 @cache

@@ -245,8 +245,12 @@ def _worked_out_later(kind: type) -> frozenset[str]:
 def _is_own_file(file: Path) -> bool:
     """Whether it is a file, no link or pipe, and no other user's: entries are read by pickle."""
     found = file.lstat()
-    own = not hasattr(os, "getuid") or found.st_uid == os.getuid()
-    return own and stat.S_ISREG(found.st_mode)
+    return is_own(found) and stat.S_ISREG(found.st_mode)
+
+
+def is_own(found: os.stat_result) -> bool:
+    """Whether a file or folder is this user's, where users own files."""
+    return not hasattr(os, "getuid") or found.st_uid == os.getuid()
 
 
 def _digest(key: str, data: bytes) -> bytes:
