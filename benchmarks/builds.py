@@ -59,6 +59,7 @@ def run(
     answered = None
     with (folder / "log.txt").open("w+b") as log:
         variables = os.environ | INSTALLED | (environment or {})
+        variables.pop("PYTHONDONTWRITEBYTECODE", None)  # pip compiles what it installs
         process = subprocess.Popen(command, stdout=log, stderr=subprocess.PIPE, env=variables)
         for line in process.stderr or ():
             log.write(line)

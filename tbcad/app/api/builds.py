@@ -175,18 +175,23 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
     The files are read back before they replace the old ones.
     """
     from tbcad_verify.report.as_made import AsMade
-    from tbcad_verify.run.processes import Processes
+    from tbcad_verify.run.processes import Processes, load
 
     from tbcad.common.schedule import background_work
     from tbcad.output.folder import replacing
 
     out, verify, progress = Path(options.out), options.verify, options.progress
-    with Processes(1) as worker, replacing(out, "build", options.force) as folder:
+    with (
+        Processes(1) as worker,
+        Processes(1) as ready,
+        replacing(out, "build", options.force) as folder,
+    ):
         with background_work(worker) as submit:
             submit(_load_libraries)  # while the mirrors are computed here
             from tbcad.core.mirrors.array import design
 
             mirrors = design(plan.spec, options.detail)
+            loading = ready.submit(load, "tbcad_verify.run.stages") if verify else None
             simulated = submit(_as_made, mirrors) if verify and "shell" in plan.parts else None
             from tbcad.output.build import write_export
 
@@ -196,11 +201,12 @@ def _build_files(plan: BuildPlan, options: BuildOptions) -> Build:
             )
             printed = submit(_prototype_as_made, folder) if verify else None
         report = None
-        if verify:
+        if loading:
+            loading.exception()  # of one that ended here the verification will tell
             cutter = plan.process.ball_mm if plan.process else None
             asked = VerificationOptions(folder, progress=progress, cutter=cutter)
             report = replace(
-                verification(asked, worker),  # which has the kernel loaded
+                verification(asked, worker, ready),  # the first has the kernel loaded
                 folder=out,
                 note=export.note,
                 as_made=replace(

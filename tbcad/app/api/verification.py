@@ -40,8 +40,10 @@ def verify(options: VerificationOptions) -> Report:
     return verification(options)
 
 
-def verification(options: VerificationOptions, idle: Processes | None = None) -> Report:
-    """The same; `idle` is as `tbcad_verify` takes it."""
+def verification(
+    options: VerificationOptions, idle: Processes | None = None, ready: Processes | None = None
+) -> Report:
+    """The same; `idle` and `ready` are as `tbcad_verify` takes them."""
     from tbcad_verify.errors import BadExport
     from tbcad_verify.run.verify import VerifyOptions
     from tbcad_verify.run.verify import verify as verify_files
@@ -60,6 +62,7 @@ def verification(options: VerificationOptions, idle: Processes | None = None) ->
             lambda name: options.progress(f"verification: {name}"),
             asked,
             idle,
+            ready,
         )
     except BadExport as error:
         raise InputError(str(error)) from None

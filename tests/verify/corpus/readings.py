@@ -54,7 +54,7 @@ PURE: dict[str, tuple[str, ...]] = {
     "step.front_checks": ("cells_of_export",),
     "step.shell_checks": ("wall",),
     "prototype.stages": ("measure_part", "join_meshes"),
-    "prototype.bodies_apart": ("overlaps",),
+    "prototype.bodies_apart": ("shared_rooms",),
     "prototype.measured_parts": ("manifold",),
     "prototype.assembly": ("manifold", "read_solids"),
     "prototype.bodies": ("indexed_mesh", "join_meshes", "build_scene"),

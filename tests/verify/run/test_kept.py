@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tbcad_verify.errors import BadExport
 from tbcad_verify.report.checks import Check, unknown
-from tbcad_verify.run.kept import STORE, Store, digest, keeping, kept
+from tbcad_verify.run.kept import STORE, Store, digest, is_kept, keeping, kept
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import Results
 from tbcad_verify.run.stages import _all_known
@@ -94,6 +94,21 @@ def test_equal_arguments_are_worked_out_once(store: Store) -> None:
     assert store.reused == {"squares"}
     large = np.zeros((100_000, 3))  # which is not written by parts
     assert [called(store, squared, one)[1] for one in (large, large + 0, large.T)] == [1, 0, 1]
+
+
+def test_what_a_call_would_only_read_is_known_before(store: Store) -> None:
+    def known(value: str, kept_in: Store | None = store) -> bool:
+        with keeping(kept_in):
+            return is_kept(staged, value)
+
+    assert not known("all")
+    called(store, staged, "all", lambda _: None)
+    called(store, staged, "lost", lambda _: None)
+    others = None, replace(store, fresh=True), replace(store, folder=None)
+    assert [known("all"), known("lost"), *(known("all", one) for one in others)] == [
+        *(True, False),
+        *(False, False, False),
+    ]
 
 
 def test_without_a_store_everything_is_worked_out() -> None:

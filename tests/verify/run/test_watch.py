@@ -12,6 +12,7 @@ import pytest
 from tbcad_verify import BadExport
 from tbcad_verify.report.checks import Check
 from tbcad_verify.report.report import NAME
+from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import CollectedResults, Results, ResultSink
 from tbcad_verify.run.verify import VerifyOptions, verify, watch
 
@@ -36,7 +37,8 @@ def stages(end: str, report: ResultSink) -> None:
 
 def watched(end: str, seconds: float = 30) -> CollectedResults:
     results = CollectedResults()
-    watch(STAGES, results, seconds, stages, end)
+    with Processes(1, seconds) as processes:
+        watch(STAGES, results, processes, stages, end)
     return results
 
 
@@ -65,8 +67,8 @@ def test_no_worker_outlives_an_interrupt() -> None:
 
     started: list[int] = []
     results = CollectedResults(progress=interrupt)
-    with pytest.raises(KeyboardInterrupt):
-        watch(STAGES, results, 30, stages, "hangs")
+    with pytest.raises(KeyboardInterrupt), Processes(1, 30) as processes:
+        watch(STAGES, results, processes, stages, "hangs")
     assert started
     assert not Path(f"/proc/{started[0]}").exists()
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from tbcad_verify.prototype.fastener_checks import MOTOR_DEPTH_MM
 from tbcad_verify.record.prototype import GLB, PlacedFastener
 from tbcad_verify.record.spec import BaseSpec
 from tbcad_verify.report.checks import Check, CheckName, at_most, informative, short_list
+from tbcad_verify.run.kept import kept
 from tbcad_verify.types import Floats
 
 FILE = GLB
@@ -39,6 +41,16 @@ FITS: tuple[tuple[str, str, Callable[[BaseSpec], float]], ...] = (
 )
 
 
+@dataclass(frozen=True)
+class SharedRoom:
+    """The room that two bodies share."""
+
+    pair: tuple[str, str]  # names of both
+    corners: Floats  # (V, 3) mm
+    volume: float  # mm^3
+    thickness: float  # mean of its thickest piece, mm
+
+
 def checks(
     names: list[CheckName],
     context: PrototypeContext,
@@ -52,27 +64,31 @@ def checks(
     skin = max(SKIN_MM, context.export.mesh_error_mm)
     placed = {one.name: one for one in context.prototype.fasteners}
     fits, worst, clashes = list[str](), 0.0, list[tuple[float, str]]()
-    for pair, shared in overlaps({**closed, **own}):
-        depth = meant_fit(base, placed, pair, shared, skin)
+    for room in shared_rooms({**closed, **own}):
+        depth, both = meant_fit(base, placed, room, skin), " and ".join(room.pair)
         if depth is not None:
-            fits.append(f"{' and '.join(pair)} {depth:.2f}")
+            fits.append(f"{both} {depth:.2f}")
             continue
-        worst = max(worst, thick := thickness(shared))
-        if thick > skin:
-            text = f"{' and '.join(pair)} share {shared.volume():.3g} mm^3"
-            clashes.append((-shared.volume(), text))
+        worst = max(worst, room.thickness)
+        if room.thickness > skin:
+            clashes.append((-room.volume, f"{both} share {room.volume:.3g} mm^3"))
     apart = at_most(names[0], worst, skin, short_list([text for _, text in sorted(clashes)]))
     return [apart, informative(names[1], len(fits), ", ".join(fits))]
 
 
-def overlaps(solids: Mapping[str, Any]) -> list[tuple[tuple[str, str], Any]]:
-    """All pairs of solids that share room, by name, and the room."""
+@kept("checks of bodies apart")
+def shared_rooms(solids: Mapping[str, Any]) -> list[SharedRoom]:
+    """The room of all pairs of solids that share some; `solids`: of manifold3d, by name."""
     titles = sorted(solids)
     low, high = np.split(np.array([solids[name].bounding_box() for name in titles]), 2, axis=1)
     near = ((low[:, None] < high) & (low < high[:, None])).all(axis=2)
     pairs = [(titles[a], titles[b]) for a, b in np.argwhere(np.triu(near, 1)).tolist()]
     rooms = [(pair, solids[pair[0]] ^ solids[pair[1]]) for pair in pairs]
-    return [(pair, room) for pair, room in rooms if not room.is_empty()]
+    return [
+        SharedRoom(pair, room.to_mesh64().vert_properties[:, :3], room.volume(), thickness(room))
+        for pair, room in rooms
+        if not room.is_empty()
+    ]
 
 
 def thickness(shared: Any) -> float:
@@ -84,27 +100,24 @@ def thickness(shared: Any) -> float:
 def meant_fit(
     base: BaseSpec,
     placed: Mapping[str, PlacedFastener],
-    pair: tuple[str, str],
-    shared: Any,
+    room: SharedRoom,
     skin: float,
 ) -> float | None:
     """Depth of a fit that is in the tables and no deeper than there, mm; None of anything else.
 
-    Of a pair of bodies, by name, and the room that they share; `placed`: all fasteners, by name.
+    `placed`: all fasteners, by name.
     """
-    for name, other in (pair, pair[::-1]):
+    for name, other in (room.pair, room.pair[::-1]):
         screw = placed.get(name)
         if screw and other in TAPPED_MM and re.fullmatch(SCREW, screw.part):
             # Its shank beyond the face that it presses on, in what it is turned into.
-            corners = shared.to_mesh64().vert_properties[:, :3]
-            along = (corners - screw.position) @ screw.along
+            along = (room.corners - screw.position) @ screw.along
             shank, depth = along.min() >= -skin, float(np.ptp(along))
             fits = shank and screw.through[-1] == other and depth <= TAPPED_MM[other] + skin
             return depth if fits else None
         for first, second, pressed in FITS:
             if re.fullmatch(first, screw.part if screw else name) and re.fullmatch(second, other):
-                depth = thickness(shared)
-                return depth if 0 < pressed(base) >= depth - skin else None
+                return room.thickness if 0 < pressed(base) >= room.thickness - skin else None
     return None
 
 

@@ -18,6 +18,7 @@ from tbcad_verify.prototype.bricks import STEP_MM, Bricks, fill_bricks, shapes
 from tbcad_verify.prototype.context import OTHER_SAG, PrototypeContext
 from tbcad_verify.prototype.measured_parts import MeasuredPart, of_roles
 from tbcad_verify.report.checks import Check, CheckName, at_most, require
+from tbcad_verify.run.kept import kept
 from tbcad_verify.types import Floats
 
 FILE = "sag.csv"
@@ -123,6 +124,7 @@ def _by_weight(
     return moved / (printer.modulus_gpa * 1e3)
 
 
+@kept("checks of the sag")
 def _moved(
     mesh: Mesh,
     shaft: Floats,

@@ -39,11 +39,16 @@ class Store:
     fresh: bool = False  # everything is worked out, and kept in place of what there is
     reused: set[str] = field(default_factory=set)  # subjects of what was not worked out
 
+    def file(self, key: str) -> Path:
+        """The file of a result; there must be a folder."""
+        assert self.folder
+        return self.folder / f"{PREFIX}{key}"
+
     def get(self, key: str) -> Any:
         """A result, or None: there is none, or it is damaged, and then dropped."""
         if self.folder is None or self.fresh:
             return None
-        file = self.folder / f"{PREFIX}{key}"
+        file = self.file(key)
         try:
             if not _is_own_file(file):
                 return None
@@ -67,7 +72,7 @@ class Store:
                 with os.fdopen(number, "wb") as file:
                     file.write(_digest(key, data))
                     file.write(data)
-                os.replace(name, self.folder / f"{PREFIX}{key}")
+                os.replace(name, self.file(key))
             except BaseException:  # an interrupt, a full disk
                 with contextlib.suppress(OSError):
                     os.unlink(name)
@@ -146,12 +151,24 @@ class Kept:
     sure: Callable[[Any], bool]
 
 
+def is_kept(work: Callable[..., Any], *arguments: Any) -> bool:
+    """Whether a call of a kept function, without what hears it, would only read its result."""
+    store = STORE.get()
+    if store is None or store.folder is None or store.fresh:
+        return False
+    return store.file(_key(store, cast("Any", work).__wrapped__, arguments)).is_file()
+
+
+def _key(store: Store, work: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
+    values = [None if _is_folder(given) else given for given in arguments]
+    return digest((store.code, work.__module__, work.__qualname__, values))
+
+
 def _reused(
     one: Kept, store: Store, arguments: tuple[Any, ...], sink: Callable[[Any], object]
 ) -> Any:
     folders = [given for given in arguments if _is_folder(given)]
-    values = [None if _is_folder(given) else given for given in arguments]
-    key = digest((store.code, one.work.__module__, one.work.__qualname__, values))
+    key = _key(store, one.work, arguments)
     found = store.get(key)
     if found is None:
         data = pickle.dumps(_worked_out(one, arguments, sink))

@@ -20,6 +20,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextvars import copy_context
 from dataclasses import replace
+from importlib import import_module
 from queue import SimpleQueue
 from typing import IO, Any
 
@@ -205,6 +206,11 @@ class _Process:
             self._calls.close()
         self._process.wait()
         self._answers.close()
+
+
+def load(module: str) -> None:
+    """Import a module, so that a process is ready before there is work for it."""
+    import_module(module)
 
 
 def at_once(work: Callable[..., Any], *arguments: Any) -> Future[Any]:

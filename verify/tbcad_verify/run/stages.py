@@ -32,7 +32,7 @@ from tbcad_verify.prototype.stages import STAGES as PROTOTYPE_STAGES
 from tbcad_verify.record.export import Export, read_export
 from tbcad_verify.record.validation import PartFiles
 from tbcad_verify.report.checks import Check, attempt, check_names, guarded, require, unknown
-from tbcad_verify.run.kept import kept
+from tbcad_verify.run.kept import is_kept, kept
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.run.results import MirrorChecks, Results, ResultSink
 from tbcad_verify.shell import coverage, mirrors_found, pixels
@@ -102,11 +102,14 @@ def run_stages(
     printed, facets = facets[own:], facets[:own]
     prototype: SimpleQueue[Results | None] = SimpleQueue()
     work = _verify_prototype, export, printed, profiles, bool(printers)
-    if beside and export.prototype:
+    shells = _of_shells(export), facets, profiles, bool(printers), cutter_mm
+    # Another process has to load its libraries: not where this one is free at once.
+    in_two = beside and export.prototype and not is_kept(_verify_shells, *shells)
+    if beside and in_two:
         ending = beside.submit(*work, heard=prototype.put)
         ending.add_done_callback(lambda _: prototype.put(None))
-    _verify_shells(_of_shells(export), facets, profiles, bool(printers), cutter_mm, sink)
-    if beside and export.prototype:
+    _verify_shells(*shells, sink)
+    if in_two:
         for results in iter(prototype.get, None):
             sink(results)
         ending.result()
@@ -117,7 +120,7 @@ def run_stages(
 def run_in_two(
     folder: Path, printers: Sequence[str], cutter_mm: float | None, sink: ResultSink
 ) -> None:
-    """Run all stages, those of the prototype in another process."""
+    """Run all stages, those of the prototype in another process while shells are verified."""
     with Processes(1) as beside:
         run_stages(folder, printers, cutter_mm, sink, beside)
 

@@ -64,11 +64,13 @@ def verify(
     progress: Progress = lambda _: None,
     options: VerifyOptions = VerifyOptions(),
     idle: Processes | None = None,
+    ready: Processes | None = None,
 ) -> Report:
     """Verify a build, and write verify.json into it.
 
     `progress`: called with the name of each stage before it starts.
     `idle`: processes that have done their work, and with a kernel loaded can read STEP files.
+    `ready`: one that has loaded the stages.
 
     BadExport: the folder is not a readable build, or cannot be written to; nothing is written.
     """
@@ -78,7 +80,7 @@ def verify(
     before = stamps(root, listed_names(root))
     export = read_export(root)
     results = CollectedResults(progress=progress)
-    _run(export, options, results, idle)
+    _run(export, options, results, idle, ready)
     programs = _ask_programs(export, results, options.seconds) if options.clients else []
     _refuse_changes(export, before)
     blank = np.full(len(export.mirrors), np.nan)
@@ -104,14 +106,19 @@ def verify(
 
 
 def _run(
-    export: Export, options: VerifyOptions, results: CollectedResults, idle: Processes | None
+    export: Export,
+    options: VerifyOptions,
+    results: CollectedResults,
+    idle: Processes | None,
+    ready: Processes | None,
 ) -> None:
     """All stages; an interrupt ends the processes that read files, which take long."""
     work = export.folder, options.printers, options.cutter_mm
     with _steps(export, options.seconds, idle) as steps:
         # Reading STEP files needs none of the stages, and takes as long as they do.
         if options.apart:
-            watch(stage_titles(export), results, options.seconds, run_in_two, *work)
+            with Processes(1, options.seconds, ready) as processes:
+                watch(stage_titles(export), results, processes, run_in_two, *work)
         else:
             run_stages(*work, results.add)
         _compare_steps(export, results, steps)
@@ -120,7 +127,7 @@ def _run(
 def watch(
     titles: Sequence[str],
     results: CollectedResults,
-    seconds: float,
+    processes: Processes,
     stages: Callable[..., None],
     *arguments: Any,
 ) -> None:
@@ -130,11 +137,10 @@ def watch(
 
     BadExport: the folder is not a readable build.
     """
-    with Processes(1, seconds) as processes:
-        try:
-            processes.call(stages, *arguments, heard=results.add)
-        except ProcessEnded as end:
-            results.checks += _unknown_stages(titles, results.stages, str(end))
+    try:
+        processes.call(stages, *arguments, heard=results.add)
+    except ProcessEnded as end:
+        results.checks += _unknown_stages(titles, results.stages, str(end))
 
 
 def _unknown_stages(titles: Sequence[str], begun: Sequence[str], reason: str) -> list[Check]:

@@ -18,6 +18,7 @@ from tbcad_verify.mesh.spheroids import growth, least_wall
 from tbcad_verify.record.export import Camera
 from tbcad_verify.record.flange_holes import Hole
 from tbcad_verify.report.checks import Unknown
+from tbcad_verify.run.kept import kept
 from tbcad_verify.step.grammar import refuse_foreign
 from tbcad_verify.step.part21 import StepTable
 from tbcad_verify.types import Floats
@@ -52,6 +53,7 @@ class TextSolid:
     colour: tuple[float, ...] = ()  # red, green, blue (sRGB) and opacity, 0 to 1; empty: none
 
 
+@kept("text of STEP files")
 def read_solids(text: str) -> dict[str, TextSolid]:
     """Solids by the name of their product, where the file itself puts them.
 
