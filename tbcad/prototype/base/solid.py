@@ -215,7 +215,7 @@ def _meshes(
 ) -> tuple[list[Manifold], list[Manifold]]:
     """Meshes of what is added, and of what is cut out: the hollows of the seats and others."""
     hollows = [
-        moved_mesh(seat_hollow_mesh(seats, k, seats.pad_offset), seats.axes[k], seats.centre[k])
+        moved_mesh(seat_hollow_mesh(seats, k), seats.axes[k], seats.centre[k])
         for k in range(len(seats))
     ]
     bodies, tools = ([as_manifold(one, COARSE_MM) for one in some] for some in (added, others))
@@ -237,8 +237,7 @@ def added_solids(base: BaseLayout, seats: Seats, split: BaseSplit = UNCUT) -> li
 
 def removed_solids(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:
     """Solids cut out of that union: first the hollows of all seats, then paths and holes."""
-    hollows = _at_seats(seats, lambda seats, k: seat_hollow(seats, k, seats.pad_offset))
-    return [*hollows, *_paths_and_holes(base, seats)]
+    return [*_at_seats(seats, seat_hollow), *_paths_and_holes(base, seats)]
 
 
 def _paths_and_holes(base: BaseLayout, seats: Seats) -> list[TopoDS_Shape]:

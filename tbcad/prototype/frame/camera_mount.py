@@ -32,7 +32,7 @@ from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import PrototypeSpec
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned, when
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.frame.chosen_camera import (
     ChosenCamera,
@@ -484,30 +484,15 @@ def _check_camera(place: _Place, bodies: tuple[Component, ...]) -> None:
     "Bracket, plate and fence of the camera",
     *("camera_bracket", "camera_plate", "camera_fence", "camera", "camera_lens"),
 )
-def camera_step(machine: AssembledMachine) -> Words:
+def camera_step(machine: AssembledMachine) -> Values:
     """The camera's mount."""
-    made_for = machine.has("camera_lens")
-    on_step = {"camera_fence", "camera"}
-    stands = any(on_step <= {*one.through} for one in machine.fasteners)
-    step = when(stands, " on the fence's step")
-    does = [
-        "Press the inserts into the camera plate from behind.",
-        "Bracket on the base plate with washers, in the middle of its slots.",
-        "Three long screws with washers from behind through the bracket's slots; on each between "
-        "bracket and plate a washer and two nuts, then into the plate's inserts. "
-        f"{GAP_MM:g} mm between plate and bracket. The nut at the plate locks the screw, the other "
-        "one clamps the bracket.",
-        "Camera and lens are not in the list: camera.json has what they must do, and tbcad camera "
-        "shows which on sale do it."
-        + when(made_for, " The mount is made for the camera and the lens that the picture names."),
-        f"Fence on the plate. Then your camera{step} by its tripod thread, through the plate, its "
-        "back against the fence.",
-    ]
-    checks = [
-        f"The gap between plate and bracket is {GAP_MM:g} mm at all three screws, to 0.5 mm.",
-        "The camera looks at the object, and cannot be turned on its screw by hand.",
-    ]
-    return does, checks
+    stands = any({"camera_fence", "camera"} <= {*one.through} for one in machine.fasteners)
+    named = " The mount is made for the camera and the lens that the picture names."
+    return {
+        "gap": GAP_MM,
+        "made_for": when(machine.has("camera_lens"), named),
+        "step": when(stands, " on the fence's step"),
+    }
 
 
 CAMERA = Part((camera_step,), camera_mount, remedies={"camera*": REMEDY})
