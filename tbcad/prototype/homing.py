@@ -21,12 +21,7 @@ from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, PIN_MM, PIN_OUT_MM, SC
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.balance import HomeAngles, home_angles
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.shared import (
-    ENGAGEMENT_MM,
-    THROUGH_MM,
-    BearingHead,
-    HeadPlate,
-)
+from tbcad.prototype.frame.shared import ENGAGEMENT_MM, THROUGH_MM, BearingHead, HeadPlate
 from tbcad.prototype.part import FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import Parts, choose_part, choose_screw
 from tbcad.types import Floats

@@ -34,12 +34,7 @@ from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import PrototypeSpec
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned, when
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.chosen_camera import (
-    ChosenCamera,
-    chosen_camera,
-    plate_face,
-    with_camera,
-)
+from tbcad.prototype.frame.chosen_camera import ChosenCamera, chosen_camera, plate_face, with_camera
 from tbcad.prototype.frame.shared import (
     CLEARANCE_HOLE_MM,
     OVERLAP_MM,

@@ -17,13 +17,7 @@ from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive, pitch_diameter
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import PartsList
-from tbcad.prototype.frame.shared import (
-    GAP_MM,
-    OVERLAP_MM,
-    PLATE_MM,
-    THROUGH_MM,
-    HeadPlate,
-)
+from tbcad.prototype.frame.shared import GAP_MM, OVERLAP_MM, PLATE_MM, THROUGH_MM, HeadPlate
 from tbcad.prototype.part import FrameLayout, Part, Site
 from tbcad.prototype.purchased.parts import PurchasedPart, choose_screw
 from tbcad.prototype.sheets import ASIDE_MM, fitted, title_block

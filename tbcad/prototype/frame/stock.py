@@ -26,13 +26,7 @@ from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, pla
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import PartsList
 from tbcad.prototype.frame.corner import CORNER, StandingBar
-from tbcad.prototype.frame.shared import (
-    EXTRUSION_MM,
-    UPRIGHTS,
-    WASHER,
-    BearingHead,
-    drilled_holes,
-)
+from tbcad.prototype.frame.shared import EXTRUSION_MM, UPRIGHTS, WASHER, BearingHead, drilled_holes
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import PurchasedPart, choose_part, choose_screw, of_kind

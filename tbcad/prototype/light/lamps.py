@@ -12,15 +12,7 @@ from itertools import product
 import numpy as np
 
 from tbcad.cad.drafting.dimensions import upward
-from tbcad.cad.drafting.sheet import (
-    A4,
-    BESIDE_MM,
-    Sheet,
-    drawing_room,
-    notes,
-    placed,
-    rectangle,
-)
+from tbcad.cad.drafting.sheet import A4, BESIDE_MM, Sheet, drawing_room, notes, placed, rectangle
 from tbcad.cad.formats.entities import Layer, Line
 from tbcad.core.geometry.primitives import Component, Primitive, enclosing_triangles
 from tbcad.core.spec.errors import SpecError
