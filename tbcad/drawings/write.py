@@ -36,6 +36,7 @@ from tbcad.common.atomic_files import replace_files, write_errors_as_input_error
 from tbcad.common.schedule import background_processes
 from tbcad.drawings.export import DrawnExport, read_export
 from tbcad.drawings.optical_layout import draw_layout, has_layout
+from tbcad.drawings.part_sheet import draw_part
 from tbcad.drawings.shell_views import HOLE_HEAD, HOLE_WIDTHS_MM, ShellViews, shell_views
 from tbcad.drawings.tables import mm
 from tbcad.errors import InputError
@@ -300,9 +301,6 @@ def draw(export: DrawnExport, place: Path, name: str) -> list[WrittenSheet]:
 
     InputError: a file that is drawn is missing or not as it was written.
     """
-    from tbcad.drawings.part_sheet import draw_part
-    from tbcad.drawings.write import draw_assembly, draw_shell
-
     if name in export.parts:
         sheets = draw_part(export, export.parts[name])
     elif name in export.shells:

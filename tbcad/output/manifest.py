@@ -36,16 +36,16 @@ def write_manifest(folder: Path, kind: Kind) -> None:
     Manifest(
         schema_name=SCHEMA,
         kind=kind,
-        files={name: Entry.model_validate(fingerprint(folder / name)) for name in names},
+        files={name: fingerprint(folder / name) for name in names},
         versions={**versions, "python": platform.python_version()},
     ).write(folder / MANIFEST)
 
 
-def fingerprint(path: Path) -> dict[str, str | int]:
+def fingerprint(path: Path) -> Entry:
     """sha256 and size of a file."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256")
-    return {"sha256": digest.hexdigest(), "size": path.stat().st_size}
+    return Entry(sha256=digest.hexdigest(), size=path.stat().st_size)
 
 
 def read_manifest(folder: Path) -> Manifest | None:
@@ -66,7 +66,7 @@ def is_listed(path: Path, entry: Entry | None) -> bool:
         entry is not None
         and is_file(path)
         and entry.size == path.lstat().st_size
-        and entry.model_dump() == fingerprint(path)
+        and entry == fingerprint(path)
     )
 
 
@@ -188,7 +188,7 @@ def _runs_of(build: Path) -> Iterator[Path]:
 def _is_as(build: Path, digests: Mapping[str, Any]) -> bool:
     files = {build / name: digest for name, digest in digests.items()}
     return all(
-        path.is_file() and fingerprint(path)["sha256"] == digest for path, digest in files.items()
+        path.is_file() and fingerprint(path).sha256 == digest for path, digest in files.items()
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from tbcad.core.camera.sheet import RigLight
 from tbcad.core.mirrors.array import MirrorDesign
-from tbcad.core.spec.design import Spec
+from tbcad.core.spec.design import Spec, spec_with
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.section import AUTO
 from tbcad.core.spec.sizes import led_places
@@ -160,7 +160,7 @@ def _attempts(design: MirrorDesign) -> Iterator[Outcome]:
     """Outcomes for every number of balls."""
     parts, choices = load_parts(), BallChoices(design.spec, design.arrays[0])
     for k in ball_counts(design.spec, design, choices):
-        spec = _with(design.spec, k=k)
+        spec = spec_with(design.spec, prototype={"k": k})
         check_camera(spec, design.arrays[0], parts)  # what none of the attempts has room for
         try:
             layout = prototype_layout(spec, design, k, choices)
@@ -242,17 +242,13 @@ def _staged(
     except SpecError:
         if not section.leds_mm or section.leds_mm != led_places(spec.optics.capture_diameter_mm):
             raise
-    without = _with(spec, stage=section.model_copy(update={"leds_mm": ()}))
+    without = spec_with(spec, prototype={"stage": section.model_copy(update={"leds_mm": ()})})
     return _staged(without, layout, keep_out, parts)
 
 
-def _with(spec: Spec, **values: object) -> Spec:
-    prototype = spec.prototype.model_copy(update=values)
-    return spec.model_copy(update={"prototype": prototype})
-
-
 def _with_base(spec: Spec, **values: object) -> Spec:
-    return _with(spec, base=spec.prototype.base.model_copy(update=values))
+    base = spec.prototype.base.model_copy(update=values)
+    return spec_with(spec, prototype={"base": base})
 
 
 def _keep_out(spec: Spec, layout: PrototypeLayout, base: BaseLayout) -> KeepOut:
@@ -271,8 +267,9 @@ def _arranged(site: Site, balance: BaseBalance) -> PrototypeModel:
     upper = frame.find(UpperLamps) is not None
     light = {"lamp_z_mm": lamp_z, "upper": upper, "shroud": shroud is not None}
     chosen = with_camera(spec, site.layout.array)
+    lit = spec.prototype.light.model_copy(update=light)
     known = vars(site) | {
-        "spec": _with(chosen, light=spec.prototype.light.model_copy(update=light)),
+        "spec": spec_with(chosen, prototype={"light": lit}),
         "split": split_base(site.base, spec.printer),
     }
     return PrototypeModel(**known, balance=balance, frame=frame, shroud=shroud)
@@ -293,7 +290,9 @@ def _remedy(design: MirrorDesign, tried: list[int]) -> str:
     fixed = {key: value for key, value in _open_keys(design.spec).items() if value != AUTO}
     if not fixed:
         return f" (tried: {', '.join(map(str, dict.fromkeys(tried)))} balls)"
-    free = _with_base(_with(design.spec, k=AUTO), **dict.fromkeys(OPEN_BASE_KEYS, AUTO))
+    free = _with_base(
+        spec_with(design.spec, prototype={"k": AUTO}), **dict.fromkeys(OPEN_BASE_KEYS, AUTO)
+    )
     try:
         chosen = _open_keys(arrange(MirrorDesign(free, design.arrays)).spec)
     except SpecError:

@@ -23,13 +23,7 @@ from tbcad.cad.formats.checked_files import Row
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import MotionSpec, PrototypeSpec, StageSpec
-from tbcad.prototype.assembly_steps.machine import (
-    AssembledMachine,
-    Words,
-    planned,
-    told_words,
-    when,
-)
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned, when
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.light.upper import SUPPLY_V as UPPER_SUPPLY_V
 from tbcad.prototype.light.upper import UpperLamps
@@ -289,21 +283,19 @@ def _wire(section: StageSpec, stage: StageLayout, current_ma: float, parts: Part
 
 
 @planned("Wiring", loose=("boards", "electronics", "wires", "connectors", "resistors"))
-def wiring_step(machine: AssembledMachine) -> Words:
+def wiring_step(machine: AssembledMachine) -> Values:
     """Lines of the controller, one each; without lamps, where light comes from instead."""
     rows = machine.wiring
     switched = [{"row": row, "name": row.signal.replace("_", " ")} for row in rows if row.on]
     controller = machine.record.controller
-    return told_words(
-        __name__,
-        "wiring",
-        board=machine.ref(controller.board),
-        driver=DRIVER in machine.bill.items and machine.ref(DRIVER),
-        terminals=_terminals(controller.board, controller.firmware),
-        lines=[{"line": _line(machine, row)} for row in rows],
-        no_lamps=not machine.record.lamps,
-        switched=switched,
-    )
+    return {
+        "board": machine.ref(controller.board),
+        "driver": DRIVER in machine.bill.items and machine.ref(DRIVER),
+        "terminals": _terminals(controller.board, controller.firmware),
+        "lines": [{"line": _line(machine, row)} for row in rows],
+        "no_lamps": not machine.record.lamps,
+        "switched": switched,
+    }
 
 
 def _terminals(board: str, firmware: str) -> str:
@@ -324,14 +316,18 @@ def _line(machine: AssembledMachine, row: WiringRow) -> str:
 
 
 @planned("First photographs")
-def first_step(machine: AssembledMachine) -> Words:
+def first_step(machine: AssembledMachine) -> Values:
     """The program's first run."""
     phases = machine.record.controller.phases
     low, high = machine.record.swing_deg
     names = ", ".join(one.name.replace("_", " ") for one in phases)
     off = "Without supply the brake holds it." if machine.record.power_off.brake else LETS_FALL
     ends = {"low": low, "high": high, "without_supply": off}
-    return told_words(__name__, "first", count=len(phases), names=names, **ends)
+    return {
+        "count": len(phases),
+        "names": names,
+        **ends,
+    }
 
 
 WIRING = Part((wiring_step,), wiring_layout)

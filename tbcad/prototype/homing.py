@@ -16,23 +16,12 @@ from tbcad.core.geometry.primitives import (
 )
 from tbcad.core.geometry.rotations import unit_circle
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.assembly_steps.machine import (
-    AssembledMachine,
-    Words,
-    planned,
-    told_words,
-    when,
-)
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned, when
 from tbcad.prototype.base.hub import KEY_HOLE_MM, KEY_MM, PIN_MM, PIN_OUT_MM, SCREW_MM, ZERO_DISC_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.balance import HomeAngles, home_angles
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.shared import (
-    ENGAGEMENT_MM,
-    THROUGH_MM,
-    BearingHead,
-    HeadPlate,
-)
+from tbcad.prototype.frame.shared import ENGAGEMENT_MM, THROUGH_MM, BearingHead, HeadPlate
 from tbcad.prototype.part import FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import Parts, choose_part, choose_screw
 from tbcad.types import Floats
@@ -277,45 +266,41 @@ def _switch(base: BaseLayout, place: _SwitchPlace, parts: Parts) -> Component:
 
 
 @planned("Switch and zero pin", "home_*", "zero_disc", loose=("shafts",), near=("zero_disc",))
-def homing_step(machine: AssembledMachine) -> Words:
+def homing_step(machine: AssembledMachine) -> Values:
     """Switch, bracket and the zero pin."""
     home = machine.record.home
-    return told_words(
-        __name__,
-        "homing",
-        homes=machine.has("home_switch"),
-        pin=machine.ref(home.pin),
-        brake=machine.has("brake"),
-        motor=machine.has("motor"),
-        no_motor=not machine.has("motor"),
-        pin_mm=PIN_MM,
-        switch_deg=abs(home.switch_deg),
-    )
+    return {
+        "homes": machine.has("home_switch"),
+        "pin": machine.ref(home.pin),
+        "brake": machine.has("brake"),
+        "motor": machine.has("motor"),
+        "no_motor": not machine.has("motor"),
+        "pin_mm": PIN_MM,
+        "switch_deg": abs(home.switch_deg),
+    }
 
 
 @planned("Angle zero")
-def zero_step(machine: AssembledMachine) -> Words:
+def zero_step(machine: AssembledMachine) -> Values:
     """Settings, homing and the trim."""
     firmware, off = machine.record.controller.firmware, machine.record.power_off
     homes, klipper = firmware != "grbl", firmware == "klipper"
     rated = next((row.current_ma for row in machine.wiring if row.signal == "motor"), None)
-    return told_words(
-        __name__,
-        "zero",
-        current=machine.record.drive.hold_current_a,
-        of_motor=f", {rated / MA_PER_A:.1f} A," if rated else "",
-        homes=homes,
-        grbl=not klipper,
-        klipper=klipper,
-        grblhal=firmware == "grblhal",
-        by_hand=not homes,
-        unlock=when(firmware == "grblhal", "Unlock the controller by $X. "),
-        falls=not off.brake and off.fall_energy_j,
-        brake=off.brake and machine.ref(off.brake),
-        off=off,
-        pinned=off.pin_force_n,
-        home=machine.record.home,
-    )
+    return {
+        "current": machine.record.drive.hold_current_a,
+        "of_motor": f", {rated / MA_PER_A:.1f} A," if rated else "",
+        "homes": homes,
+        "grbl": not klipper,
+        "klipper": klipper,
+        "grblhal": firmware == "grblhal",
+        "by_hand": not homes,
+        "unlock": when(firmware == "grblhal", "Unlock the controller by $X. "),
+        "falls": not off.brake and off.fall_energy_j,
+        "brake": off.brake and machine.ref(off.brake),
+        "off": off,
+        "pinned": off.pin_force_n,
+        "home": machine.record.home,
+    }
 
 
 HOMING = Part((homing_step,), homing_layout)

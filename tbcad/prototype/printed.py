@@ -12,12 +12,7 @@ from scipy.spatial import ConvexHull
 
 from tbcad.cad.kernel.checks import SolidProperties, check_volume, closed_mesh, properties, volume
 from tbcad.cad.kernel.mesh import Mesh
-from tbcad.cad.kernel.meshing import (
-    mesh_difference,
-    mesh_of,
-    primitive_mesh,
-    without_degenerate,
-)
+from tbcad.cad.kernel.meshing import mesh_difference, mesh_of, primitive_mesh, without_degenerate
 from tbcad.cad.kernel.solids import (
     cut,
     cylinder,

@@ -5,7 +5,6 @@ Run as a program, as `shell_pictures`: `python -m tbcad.report.assembly_pictures
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from tbcad.core.geometry.vectors import unit
 from tbcad.prototype.assembly_steps.exploded import offsets
 from tbcad.prototype.assembly_steps.machine import AssembledMachine, read_machine
 from tbcad.prototype.assembly_steps.steps import Step, assembly_steps
+from tbcad.prototype.assembly_steps.views import best_eye
 from tbcad.report.page.bodies import prototype_bodies
 from tbcad.report.prototype_pictures import surface
 from tbcad.types import Bytes, Floats, Ints
@@ -28,9 +28,7 @@ ANGLE_DEG, AMBIENT = 25.0, 0.2
 FILLED = (0.66, 0.84)  # largest shares of the picture's width and height that new parts take
 CONTEXT = 0.45  # share of all that is shown, at least, that a picture has room for
 NEW, FASTENER, THERE = "#7fb0ea", "#ee7f2d", "#c4c4c4"
-# Directions to look from, degrees; their worth, since people look from above and from a corner.
-AZIMUTHS, ELEVATIONS = range(-135, 181, 45), {20: 1.0, 50: 0.95, -25: 0.8, -55: 0.7}
-SQUARE_DEG, SQUARE_WORTH = 90, 0.9
+SQUARE_WORTH = 0.9  # of directions along x or y: shades tell more than lines
 ANCHOR_PX = 12  # visible pixels that a call-out needs
 DIGIT, SHADES = 8, 32  # of colours that number bodies
 FONT, DOT, LINE, HALO = 26, 5, 3, 7
@@ -143,22 +141,18 @@ def _numbers(pixels: Bytes) -> Ints:
 def _best_eye(scene: _Scene, step: Step) -> Floats:
     """The direction from which most kinds of new parts are seen."""
     plotter = scene.numbered(SMALL)
-    eyes, worth, seen = [], [], []
-    for (elevation, value), azimuth in product(ELEVATIONS.items(), AZIMUTHS):
-        turn, up = np.radians(azimuth), np.radians(elevation)
-        eyes.append(np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)]))
-        worth.append(value * (SQUARE_WORTH if azimuth % SQUARE_DEG == 0 else 1.0))
-    for eye in eyes:
+
+    def seen(eye: Floats) -> list[int]:
         scene.look(plotter, eye)
         plotter.render()  # what was drawn before is shown otherwise
         numbers = _numbers(np.array(plotter.screenshot(None, return_img=True)))
         pixels = _visible(scene, numbers)
         # Of the best seen body of each kind of part.
-        seen.append([max((pixels.get(n, 0) for n in use.bodies), default=0) for use in step.parts])
+        return [max((pixels.get(n, 0) for n in use.bodies), default=0) for use in step.parts]
+
+    eye = best_eye(seen, SQUARE_WORTH)
     plotter.close()
-    area = np.array(seen)
-    scores = np.sqrt(area / np.maximum(area.max(axis=0), 1.0)).sum(axis=1)
-    return eyes[int(np.argmax(scores * np.array(worth)))]
+    return eye
 
 
 def _visible(scene: _Scene, numbers: Ints) -> dict[str, int]:

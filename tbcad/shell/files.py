@@ -29,12 +29,7 @@ from tbcad.core.optics.cells import Cells, cell_integrals
 from tbcad.core.optics.pedestals.cells import PedestalCells, wall_integrals
 from tbcad.records.design import MandrelRecord
 from tbcad.shell.envelope import Envelope, Holes, boundary_chain, chain_ends
-from tbcad.shell.halves import (
-    camera_a_mandrel_mesh,
-    camera_a_mesh,
-    design_mandrel,
-    shell_envelope,
-)
+from tbcad.shell.halves import camera_a_mandrel_mesh, camera_a_mesh, design_mandrel, shell_envelope
 from tbcad.shell.mandrel import Mandrel
 from tbcad.shell.solid import FrontEdges, casing_faces, front_edges, reversed_ring
 from tbcad.types import Floats, Progress

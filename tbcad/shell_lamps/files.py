@@ -38,7 +38,9 @@ def write_ring(spec: Spec, ring: LampRing, part: PrintedPart, folder: Path) -> N
     estimate = write_part(folder, part, spec)
     item = bom.PrintedItem(part.name, part.what, part.solid.volume, estimate)
     prices = load_prices(spec.prototype.prices)
-    rows = bom.list_rows(ring_parts(ring, parts), {item: RINGS}, spec.printer.density_g_cm3, prices)
+    rows = bom.list_rows(
+        ring_parts(ring, parts), [(item, RINGS)], spec.printer.density_g_cm3, prices
+    )
     write_table(folder / LIST, bom.COLUMNS, rows)
     write_table(folder / WIRING, WiringRow.columns(), wiring_rows(ring))
 

@@ -123,7 +123,7 @@ class TestInputs:
 class TestBuildOfARun:
     def photographed(self, run: Path, build: Path) -> None:
         fake(run, "run")
-        digests = {"design.json": fingerprint(build / "design.json")["sha256"]}
+        digests = {"design.json": fingerprint(build / "design.json").sha256}
         (run / "run.json").write_text(
             json.dumps({"schema": "tbcad-run/1", "export_sha256": digests})
         )

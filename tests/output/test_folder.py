@@ -25,7 +25,7 @@ def fill(folder: Path, version: int) -> None:
     for name in NAMES:
         (folder / name).write_text(f"{name} of version {version}\n" * 50)
     document = {"schema": "tbcad-manifest/1", "kind": "build", "files": {}}
-    document["files"] = {name: fingerprint(folder / name) for name in NAMES}
+    document["files"] = {name: fingerprint(folder / name).model_dump() for name in NAMES}
     (folder / "manifest.json").write_text(json.dumps(document))
     (folder / "verify.json").write_text(str(version))
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tbcad.core.geometry.vectors import FLIP_X, dot, norm
+from tbcad.core.geometry.vectors import FLIP_X, dot
 from tbcad.types import Floats, Ints
 
 
@@ -20,13 +20,6 @@ class Mesh:
         """Signed volume, mm^3."""
         corner = self.vertices[self.triangles]
         return float(dot(corner[:, 0], np.cross(corner[:, 1], corner[:, 2])).sum()) / 6
-
-    @property
-    def areas(self) -> Floats:
-        """Areas of the triangles, mm^2, (t,)."""
-        corner = self.vertices[self.triangles]
-        across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        return np.asarray(norm(across) / 2)
 
     def mirrored(self) -> "Mesh":
         """Mirror image in the plane x = 0."""

@@ -88,8 +88,8 @@ def read_machine(folder: Path) -> AssembledMachine:
     return AssembledMachine(bill, record, wiring, sizes, load_parts())
 
 
-Words: TypeAlias = tuple[list[str], ...]
-"""Actions of a step, checks afterwards, and fits; empty texts are left out."""
+Values: TypeAlias = dict[str, object]
+"""What the words of a step have in their places, and what decides which of them are told."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class StepPlan:
     """A step as it is planned for all designs."""
 
     title: str  # of the step
-    words: Callable[[AssembledMachine], Words]  # for a prototype; named by the step
+    values: Callable[[AssembledMachine], Values]  # of its words for a prototype; named by the step
     bodies: tuple[str, ...]  # patterns of names of the bodies that it mounts
     loose: tuple[str, ...]  # parts, or kinds of them, without bodies that it takes
     near: tuple[str, ...]  # bodies that the picture shows, too
@@ -105,7 +105,13 @@ class StepPlan:
     @property
     def key(self) -> str:
         """Name of the step for files."""
-        return self.words.__name__.removesuffix("_step")
+        return self.values.__name__.removesuffix("_step")
+
+    def words(self, machine: AssembledMachine) -> tuple[list[str], ...]:
+        """Actions, checks afterwards, and fits, from the TOML file beside the step's module."""
+        values = self.values(machine)
+        kinds = _texts(self.values.__module__)[self.key].values()
+        return tuple([text for _, text in told(lines, values)] for lines in kinds)
 
     def needed(self, machine: AssembledMachine) -> bool:
         """Whether a prototype has any of its bodies; a step of none is always needed."""
@@ -118,16 +124,9 @@ class StepPlan:
 
 def planned(
     title: str, *bodies: str, loose: tuple[str, ...] = (), near: tuple[str, ...] = ()
-) -> Callable[[Callable[[AssembledMachine], Words]], StepPlan]:
-    """Plan a step whose words a function gives."""
-    return lambda words: StepPlan(title, words, bodies, loose, near)
-
-
-def told_words(module: str, step: str, **values: object) -> Words:
-    """Words of a step from the TOML file beside a module, by its name, with values (`told`)."""
-    return tuple(
-        [text for _, text in told(lines, values)] for lines in _texts(module)[step].values()
-    )
+) -> Callable[[Callable[[AssembledMachine], Values]], StepPlan]:
+    """Plan a step whose words have the values that a function gives."""
+    return lambda values: StepPlan(title, values, bodies, loose, near)
 
 
 @cache

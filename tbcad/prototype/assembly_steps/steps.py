@@ -189,7 +189,7 @@ def _step(machine: AssembledMachine, number: int, plan: StepPlan, uses: tuple[Us
     fasteners = [one for one in machine.fasteners if one.name in names]
     through = {body for one in fasteners for body in one.through}
     near = tuple(sorted((through | set(plan.near)) & set(machine.bodies) - names))
-    does, checks, *more = ([text for text in texts if text] for texts in plan.words(machine))
+    does, checks, *more = plan.words(machine)
     fits = (*_torques(machine, fasteners), *_fits(machine, uses), *chain(*more))
     return Step(number, plan.key, plan.title, uses, tuple(does), fits, tuple(checks), near)
 

@@ -1,6 +1,6 @@
 """Line pictures of the steps of assembly: new parts apart from their places, others thin."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from itertools import product
 
 import numpy as np
@@ -87,7 +87,8 @@ def _drawn(
     From the direction `eye`; None: from which most kinds are seen.
     """
     rays = ray_scene(shown)
-    axes = axes_toward(eye or _best_eye(shown, rays, [group for _, group in listed if group]))
+    groups = [group for _, group in listed if group]
+    axes = axes_toward(eye or best_eye(_counting(shown, rays, groups), SQUARE_WORTH))
     left, low, right, high = room
     edge = 2 * EDGE / PIXELS
     inner = (left + edge, low, right - edge, high)
@@ -195,23 +196,36 @@ def _other_end(line: Line, end: Point) -> Point:
     return line.end if line.start == end else line.start
 
 
-def _best_eye(bodies: Bodies, rays: RayMeshIntersector, groups: list[list[str]]) -> Floats:
-    """The direction from which most kinds of new parts are seen; rays: of the bodies' scene."""
+def best_eye(seen: Callable[[Floats], Sequence[int]], square_worth: float) -> Floats:
+    """The direction from which most kinds of new parts are seen.
+
+    seen: how much is seen of each kind from a direction; square_worth: of directions along x or y.
+    """
+    eyes, worth, area = [], [], []
+    for (elevation, value), azimuth in product(ELEVATIONS.items(), AZIMUTHS):
+        turn, up = np.radians(azimuth), np.radians(elevation)
+        eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+        eyes.append(eye)
+        worth.append(value * (square_worth if azimuth % SQUARE_DEG == 0 else 1.0))
+        area.append(seen(eye))
+    share = np.array(area) / np.maximum(np.max(area, axis=0), 1.0)
+    return eyes[int(np.argmax(np.sqrt(share).sum(axis=1) * np.array(worth)))]
+
+
+def _counting(
+    bodies: Bodies, rays: RayMeshIntersector, groups: list[list[str]]
+) -> Callable[[Floats], list[int]]:
+    """Rays from a direction that meet the best seen body of each group; rays: of their scene."""
     names = sorted(bodies)
     owner = np.repeat(np.arange(len(names)), [len(bodies[name].faces) for name in names])
     numbers = [[names.index(name) for name in group] for group in groups]
     corners = _corners(bodies, bodies)
-    eyes, worth, seen = [], [], []
-    for (elevation, value), azimuth in product(ELEVATIONS.items(), AZIMUTHS):
-        turn, up = np.radians(azimuth), np.radians(elevation)
-        eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+
+    def seen(eye: Floats) -> list[int]:
         counts = np.bincount(_seen(rays, owner, corners, eye), minlength=len(names))
-        eyes.append(eye)
-        worth.append(value * (SQUARE_WORTH if azimuth % SQUARE_DEG == 0 else 1.0))
-        seen.append([max(counts[group]) for group in map(np.array, numbers)])
-    area = np.array(seen, dtype=np.float64)
-    scores = np.sqrt(area / np.maximum(area.max(axis=0), 1.0)).sum(axis=1)
-    return eyes[int(np.argmax(scores * np.array(worth)))]
+        return [int(counts[group].max()) for group in numbers]
+
+    return seen
 
 
 def _seen(rays: RayMeshIntersector, owner: Ints, corners: Floats, eye: Floats) -> Ints:

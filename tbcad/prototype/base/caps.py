@@ -13,18 +13,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tbcad.cad.drafting.sheet import A4, Sheet, TitleBlock, choose_scale, sheet_frame
+from tbcad.cad.drafting.sheet import A4, Sheet, TitleBlock, choose_scale
 from tbcad.cad.formats.entities import Arc, Entity, Layer, Line, Point, Polyline, Text
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.reflection import roughness_nm, scattered_share
 from tbcad.core.spec.design import Spec
-from tbcad.prototype.assembly_steps.machine import (
-    AssembledMachine,
-    Words,
-    planned,
-    told_words,
-    when,
-)
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned, when
 from tbcad.prototype.balls.layout import PrototypeLayout
 from tbcad.prototype.base.fasteners import magnet_part, seat_magnets
 from tbcad.prototype.base.holding import (
@@ -244,18 +238,16 @@ def _forces(base: BaseLayout, prototype: PrototypeLayout, k: int) -> tuple[float
 
 
 @planned("Caps", "cap_*")
-def caps_step(machine: AssembledMachine) -> Words:
+def caps_step(machine: AssembledMachine) -> Values:
     """Mirrors that are made."""
     caps = machine.record.caps
-    return told_words(
-        __name__,
-        "caps",
-        drawings=", ".join(str(one.pdf) for one in caps),
-        ask="asks" if len(caps) == 1 else "ask",
-        printed=caps[0].material == MATERIALS["printed"],
-        turned=caps[0].material == MATERIALS["turned"],
-        caps=[{"cap": one, "magnet": _magnet_of(machine, one)} for one in caps],
-    )
+    return {
+        "drawings": ", ".join(str(one.pdf) for one in caps),
+        "ask": "asks" if len(caps) == 1 else "ask",
+        "printed": caps[0].material == MATERIALS["printed"],
+        "turned": caps[0].material == MATERIALS["turned"],
+        "caps": [{"cap": one, "magnet": _magnet_of(machine, one)} for one in caps],
+    }
 
 
 def _magnet_of(machine: AssembledMachine, cap: CapRecord) -> str:
@@ -266,21 +258,19 @@ def _magnet_of(machine: AssembledMachine, cap: CapRecord) -> str:
 
 
 @planned("Balls into their seats", "ball_*", near=("carrier",))
-def balls_step(machine: AssembledMachine) -> Words:
+def balls_step(machine: AssembledMachine) -> Values:
     """Balls in their seats, by what holds them."""
     held = [one for one in machine.record.holding.balls if one.ball in machine.sizes]
     magnets = [one for one in held if one.by == "magnet"]
     strongest = max(magnets, default=None, key=lambda one: one.force_available_n)
     named = ((one.ball, machine.ref(f"ball {machine.sizes[one.ball]}")) for one in held)
-    return told_words(
-        __name__,
-        "balls",
-        caps=machine.record.caps,
-        strongest=strongest,
-        glue=strongest is None,
-        balls=[{"name": name.capitalize(), "number": number} for number, name in named],
-        kg=machine.record.drive.mass_g / G_PER_KG,
-    )
+    return {
+        "caps": machine.record.caps,
+        "strongest": strongest,
+        "glue": strongest is None,
+        "balls": [{"name": name.capitalize(), "number": number} for number, name in named],
+        "kg": machine.record.drive.mass_g / G_PER_KG,
+    }
 
 
 def cap_sheet(design: str, base: BaseLayout, prototype: PrototypeLayout, one: CapRecord) -> Sheet:
@@ -298,12 +288,11 @@ def cap_sheet(design: str, base: BaseLayout, prototype: PrototypeLayout, one: Ca
         view="section through the axis",
     )
     entities = [
-        *sheet_frame(A4, scale, block),
         *_section(base, prototype, one, scale),
         *_table(one, float(prototype.balls.radius[k]), body),
     ]
-    file = one.pdf.removesuffix(".pdf")
-    return Sheet(file, block.title, name, A4, scale, MIDDLE_MM, tuple(entities))
+    names = one.pdf.removesuffix(".pdf"), name
+    return Sheet.framed(names, block, A4, scale, MIDDLE_MM, entities)
 
 
 def _thickness(prototype: PrototypeLayout, one: CapRecord) -> float:

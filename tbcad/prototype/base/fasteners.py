@@ -6,12 +6,7 @@ import numpy as np
 
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import BaseSpec
-from tbcad.prototype.assembly_steps.machine import (
-    AssembledMachine,
-    Words,
-    planned,
-    told_words,
-)
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned
 from tbcad.prototype.base.hub import (
     BELOW_HEAD_MM,
     KEY_DEPTH_MM,
@@ -188,29 +183,27 @@ def m3_insert(spec: BaseSpec, parts: Parts) -> PurchasedPart:
 
 
 @planned("Try the seats", "coupon_*")
-def coupon_step(machine: AssembledMachine) -> Words:
+def coupon_step(machine: AssembledMachine) -> Values:
     """The coupons, before the carrier is printed."""
     names = [machine.body_ref(body) for body in machine.bodies if body.startswith("coupon_")]
     black = sum(part.finish == MATT_BLACK for part in machine.record.parts)
-    return told_words(__name__, "coupon", names=", ".join(names), black=black)
+    return {"names": ", ".join(names), "black": black}
 
 
 @planned("The carrier", "carrier", "carrier_*", loose=("GLUE-EPOXY",))
-def carrier_step(machine: AssembledMachine) -> Words:
+def carrier_step(machine: AssembledMachine) -> Values:
     """Words for parts glued and pressed into the carrier, and for its joints."""
     cut, shaft = machine.has("carrier_1"), machine.has("shaft")
     magnets = [one for one in machine.record.holding.balls if one.by == "magnet"]
     part = machine.listed(machine.bodies["shaft"]) if shaft else None
-    return told_words(
-        __name__,
-        "carrier",
-        shaft=shaft,
-        size=f" {part['diameter_mm']:g} H7" if part else "",
-        cut=cut,
-        inserted="hub and the joints" if cut else "hub",
-        magnets=[{"ball": one.ball, "magnet": machine.ref(one.magnet or "")} for one in magnets],
-        glue=not magnets,
-    )
+    return {
+        "shaft": shaft,
+        "size": f" {part['diameter_mm']:g} H7" if part else "",
+        "cut": cut,
+        "inserted": "hub and the joints" if cut else "hub",
+        "magnets": [{"ball": one.ball, "magnet": machine.ref(one.magnet or "")} for one in magnets],
+        "glue": not magnets,
+    }
 
 
 COUPON, CARRIER = Part((coupon_step,)), Part((carrier_step,))

@@ -54,12 +54,10 @@ def boss_solid(seats: Seats, k: int) -> TopoDS_Shape:
     return cylinder(seats.front[k] * ALONG, ALONG, float(seats.boss[k]), length)
 
 
-def seat_hollow(seats: Seats, k: int, offset: float = 0.0) -> TopoDS_Solid:
-    """Hollow for a ball and its magnet, without posts of pads, in the own frame of seat k.
-
-    Pads are moved off the ball by an offset, mm.
-    """
-    return Maker(mirrored=False).solid(with_posts(faces(seat_room(seats, k)), seats, k, offset))
+def seat_hollow(seats: Seats, k: int) -> TopoDS_Solid:
+    """Hollow for a ball and its magnet, without posts of pads, in the own frame of seat k."""
+    bounding = with_posts(faces(seat_room(seats, k)), seats, k, seats.pad_offset)
+    return Maker(mirrored=False).solid(bounding)
 
 
 def seat_room(seats: Seats, k: int) -> TopoDS_Shape:
@@ -88,7 +86,7 @@ def with_posts(
     return [*cups, *others, *(one for _, post in posts for one in post)]
 
 
-def seat_hollow_mesh(seats: Seats, k: int, offset: float = 0.0) -> Manifold:
+def seat_hollow_mesh(seats: Seats, k: int) -> Manifold:
     """The same by a boolean of meshes."""
     radius, cup, pocket = float(seats.radius[k]), float(seats.cup[k]), float(seats.pocket[k])
     angle = np.linspace(np.arcsin(pocket / cup), np.pi - POLE_ANGLE, ARC_POINTS)
@@ -96,7 +94,7 @@ def seat_hollow_mesh(seats: Seats, k: int, offset: float = 0.0) -> Manifold:
     bottom = [[seats.bottom[k], 0.0], [seats.bottom[k], pocket]]
     room = primitive_mesh(Revolved(np.vstack([bottom, arc, [arc[-1, 0], 0.0]])))
     posts = [
-        primitive_mesh(Cylinder(-(radius + offset) * n, -n, float(seats.pad[k]), cup))
+        primitive_mesh(Cylinder(-(radius + seats.pad_offset) * n, -n, float(seats.pad[k]), cup))
         for n in seats.local_normals[k]
     ]
     return Manifold.batch_boolean([room, *posts], OpType.Subtract)

@@ -88,18 +88,8 @@ def bom_rows(
         raise SpecError(f"{short_text(unknown[0])} is in no list of purchased parts: add it to one")
     bought = [(part, 1) for part in drive.parts]
     bought += [(part, counts[name]) for name, part in parts.items() if counts[name]]
-    rows = [
-        *ball_rows(prototype, prices),
-        *(
-            _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
-            for part, quantity in bought
-        ),
-        *(
-            (_turned if item.turned else _printed)(item, item.density or density, prices)
-            for item in printed
-        ),
-    ]
-    return [{"item": item, **row} for item, row in enumerate(rows, 1)]
+    once = ((item, 1) for item in printed)
+    return list_rows(bought, once, density, prices, ball_rows(prototype, prices))
 
 
 def tool_rows(first: int, prices: Prices) -> list[Row]:
@@ -114,16 +104,18 @@ def tool_rows(first: int, prices: Prices) -> list[Row]:
 
 def list_rows(
     bought: Iterable[tuple[PurchasedPart, int]],
-    printed: Mapping[PrintedItem, int],
+    printed: Iterable[tuple[PrintedItem, int]],
     density: float,
     prices: Prices,
+    first: Iterable[Row] = (),
 ) -> list[Row]:
-    """The rows of a list by itself: what is bought, then what is printed of a density (g/cm^3)."""
-    rows = [
+    """Numbered rows: the first ones, what is bought, then what is printed of a density (g/cm^3)."""
+    rows = [*first]
+    rows += (
         _bought(part.name, part.what, quantity, part.material, part.mass_g, prices)
         for part, quantity in bought
-    ]
-    rows += [_printed(item, density, prices, quantity) for item, quantity in printed.items()]
+    )
+    rows += (_made(item, item.density or density, prices, quantity) for item, quantity in printed)
     return [{"item": item, **row} for item, row in enumerate(rows, 1)]
 
 
@@ -177,27 +169,26 @@ def _bought(part: str, what: str, quantity: int, material: str, mass: float, pri
     return {**row, **price_columns(quantity, prices.of(part, mass)), "from": BOUGHT}
 
 
-def _printed(item: PrintedItem, density: float, prices: Prices, quantity: int = 1) -> Row:
-    """Its mass is that of a solid print, and its price that of its filament."""
+def _made(item: PrintedItem, density: float, prices: Prices, quantity: int) -> Row:
+    """A print: its mass is that of solid material, its price that of its filament.
+
+    The price of a part that is turned to order is that of its finish.
+    """
     filament_mm3, hours = item.estimate
     filament = filament_mm3 / MM3_PER_CM3 * density
     mass = item.volume / MM3_PER_CM3 * density
+    row = _row(item.name, TOOL_MARK * item.tool + item.what, quantity, item.material, mass)
+    if item.turned:
+        price = prices.of(str(item.finish), mass)
+        return {**row, **price_columns(quantity, price), "from": BOUGHT}
     return {
-        **_row(item.name, TOOL_MARK * item.tool + item.what, quantity, item.material, mass),
+        **row,
         "print_volume_mm3": round(item.volume),
         "filament_g": _estimate(filament),
         "print_hours": _estimate(hours),
         **price_columns(quantity, _with_finish(prices.of(item.material, filament), item, prices)),
         "from": PRINTED,
     }
-
-
-def _turned(item: PrintedItem, density: float, prices: Prices) -> Row:
-    """A part made to order: its price is that of its finish."""
-    mass = item.volume / MM3_PER_CM3 * density
-    price = prices.of(str(item.finish), mass)
-    row = _row(item.name, item.what, 1, item.material, mass)
-    return {**row, **price_columns(1, price), "from": BOUGHT}
 
 
 def _with_finish(price: Price | None, item: PrintedItem, prices: Prices) -> Price | None:

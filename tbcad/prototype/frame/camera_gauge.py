@@ -19,7 +19,7 @@ from tbcad.core.geometry.primitives import Component, Prism, box
 from tbcad.core.geometry.rotations import even_angles, rotated_about_x, unit_circle
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.camera import Camera
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.frame.camera_mount import CameraMount
 from tbcad.prototype.part import FrameLayout, Mounted, Part, Site
@@ -223,48 +223,16 @@ def _far_end(sizes: GaugeSizes, side: int, axes: Floats) -> Prism:
 
 
 @planned("Camera in its place", "camera_gauge", near=("carrier",))
-def gauge_step(machine: AssembledMachine) -> Words:
+def gauge_step(machine: AssembledMachine) -> Values:
     """The camera's alignment by the gauge."""
     place = machine.record.camera_place
     assert place is not None
-    sizes, error, travel = place.lengths_mm, place.error, place.travel
-    does = [
-        "Take the stage's post out of its clamp. Measure the gauge: both widths between the edges "
-        "that face each other. Sand the near arm's ends, or tape them, until near_width is "
-        "far_width x (H - hub_to_near) / (H - hub_to_far), H = hub_to_pinhole.",
-        "Gauge into the hub's bore, arms level and marked face up, flange flat on the hub; hold it "
-        "with tape. Zero pin in at zero.",
-        "Focus and stop the lens as camera.json has it: both move the pinhole.",
-        "Base at zero: turn yaw, roll and pitch until the near marks are within 10 pixels of the "
-        "place that the checks name.",
-        "Move the camera along its axis until the near arm's ends just touch the far arm's edges "
-        "in the picture. Gaps of one width: too far. Overlaps: too near. If they differ, it is the "
-        "gauge or the place across, which the next pictures tell apart.",
-        "Zero pin out. Base at -90 and 90 degrees: marked faces in one line (across), ends "
-        "touching (out). What is alike in both pictures with opposite signs is the gauge's error; "
-        "their mean is the camera's.",
-        "Repeat until every mean is below half a pixel (0.1 mm is about a pixel). Tighten all "
-        "screws, look once more. Take the gauge off, put the post back. The camera may be taken "
-        "off later: the fence brings it back.",
-    ]
-    checks = [
-        f"Before sanding: near_width {sizes.near_width:.2f}, far_width {sizes.far_width:.2f}, "
-        f"hub_to_near {sizes.hub_to_near:.2f}, hub_to_far {sizes.hub_to_far:.2f}, "
-        f"hub_to_pinhole {sizes.hub_to_pinhole:.2f} mm.",
-        *(
-            f"Base at {one.base_angle_deg:.0f} degrees: the {one.side} mark appears at column "
-            f"{one.column_px:.0f}, row {one.row_px:.0f}."
-            for one in place.pictures
-        ),
-        f"The pinhole is then known to {error.along_mm:.2f} mm along, {error.across_mm:.2f} across "
-        f"and {error.out_mm:.2f} out.",
-    ]
-    fit = (
-        f"Travel: along {travel.along_axis_mm:g} mm, across {travel.across_mm:g}, out "
-        f"{travel.out_mm:g}, yaw {travel.yaw_deg:.0f} degrees, roll {travel.roll_deg:.0f}, "
-        f"pitch {travel.pitch_deg:.0f}"
-    )
-    return does, checks, [fit]
+    return {
+        "sizes": place.lengths_mm,
+        "error": place.error,
+        "travel": place.travel,
+        "pictures": [{"one": one} for one in place.pictures],
+    }
 
 
 GAUGE = Part((gauge_step,), camera_gauge)

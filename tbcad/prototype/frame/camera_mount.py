@@ -11,7 +11,6 @@ Lengths are behind the pinhole along the optical axis, across, and out from the 
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -19,8 +18,6 @@ from tbcad.core.geometry.primitives import (
     Component,
     Cylinder,
     Primitive,
-    Prism,
-    box,
     cylinder_between,
     enclosing_triangles,
     rectangle,
@@ -28,58 +25,45 @@ from tbcad.core.geometry.primitives import (
 )
 from tbcad.core.geometry.vectors import unit
 from tbcad.core.mirrors.array import MirrorArray
-from tbcad.core.optics.camera import Camera
 from tbcad.core.spec.design import Spec
 from tbcad.core.spec.errors import SpecError
-from tbcad.core.spec.prototype import PrototypeSpec
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned, when
 from tbcad.prototype.fasteners import Fastener
-from tbcad.prototype.frame.chosen_camera import (
-    ChosenCamera,
-    chosen_camera,
-    plate_face,
-    with_camera,
+from tbcad.prototype.frame.chosen_camera import ChosenCamera, chosen_camera, with_camera
+from tbcad.prototype.frame.mount_place import (
+    FENCE_HALF_MM,
+    FENCE_MM,
+    FENCE_SCREW_MM,
+    GAP_MM,
+    M5_HOLE_MM,
+    M5_MM,
+    PLATE_MM,
+    TOP_MM,
+    TRIPOD_HOLE_MM,
+    YAW_DEG,
+    MountPlace,
 )
-from tbcad.prototype.frame.shared import (
-    CLEARANCE_HOLE_MM,
-    OVERLAP_MM,
-    THROUGH_MM,
-    level_prism,
-    webs,
-)
+from tbcad.prototype.frame.shared import OVERLAP_MM, THROUGH_MM, level_prism, webs
 from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site, frame_axes
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, choose_screw
 from tbcad.records.prototype import CameraTravel
 from tbcad.types import Floats
 
-M5_MM, M5_HOLE_MM = 5.0, CLEARANCE_HOLE_MM[5.0]
-TRIPOD_HOLE_MM = CLEARANCE_HOLE_MM[6.35]
 NUT, WASHER, INSERT = "NUT-M5", "WASHER-5", "INSERT-M5"
 NUT_MM, WASHER_MM = 4.7, 1.0
 
 # Travel to either side. Printed brackets are off by 0.5 mm and a degree; the rest is for cameras.
 ALONG_PLATE_MM, ACROSS_MM, OUT_MM = 5.0, 5.0, 3.0
-YAW_DEG, ROLL_DEG, PITCH_DEG = 3.0, 3.0, 2.0  # as far as the screws' play in the bracket lets it
+ROLL_DEG, PITCH_DEG = 3.0, 2.0  # as far as the screws' play in the bracket lets it
 
-# The camera plate.
-TOP_MM = 12.0  # of plate and bracket behind the pinhole
-PLATE_MM = 12.0  # thickness
 # The tripod screw: thread, least of the plate below its head, and in the camera (ISO 1222).
 TRIPOD_THREAD_MM, TRIPOD_MM, IN_CAMERA_MM = 6.35, 6.0, 4.7
 RISER_HALF_MM, RISER_END_MM = 15.0, 1.0  # half width, and from the lens's flange to its end
 HALF_PLATE_MM = 30.0
-GAP_MM = 14.0  # between plate and bracket: two nuts and a washer at the nearest
-UPPER_MM, LOWER_MM, PAIR_MM = 12.0, 72.0, 13.0  # of the three screws: from the top, half distance
 MIN_ENGAGEMENT_MM = 4.0  # of a screw in its insert at the farthest
 RECESS_MM = 9.0  # half width of the recess and the window for the tripod screw's head and its key
-RECESS_BEYOND_MM = 5.0  # of the recess beyond the head
 WINDOW_WALL_MM = 2.0  # between window and the upper screws' slots
-PLATE_END_MM = 5.0  # of the plate beyond the fence's slots
-# The fence.
-FENCE_MM, FENCE_HEIGHT_MM, FENCE_HALF_MM = 12.0, 14.0, 28.0
-FENCE_LIP_MM = 6.0  # least height of the fence at the camera's back
-FENCE_SCREW_MM = 20.0  # from the middle to its screws
-HEAD_HOLE_MM, HEAD_DEPTH_MM = 9.0, 8.0  # counterbore
+HEAD_HOLE_MM, HEAD_DEPTH_MM = 9.0, 8.0  # counterbore of the fence's screws
 
 # The bracket's foot.
 MOUNT_WEB_MM = 10.0  # from the bracket's upper end to the webs
@@ -99,121 +83,6 @@ class CameraMount(Mounted):
     travel: CameraTravel  # how far the camera moves to either side
     chosen: ChosenCamera | None  # camera that it is made for; None: a cylinder stands in for it
     riser: float  # height of the fence's step, between camera and camera plate, mm
-
-
-@dataclass(frozen=True)
-class _Place:
-    """Where the camera is, the frame's axes as rows (3, 3), and the insert of the three screws."""
-
-    spec: PrototypeSpec
-    axes: Floats
-    camera: Camera
-    insert: PurchasedPart
-    chosen: ChosenCamera | None
-
-    @cached_property
-    def own(self) -> Floats:
-        """Rows: behind the pinhole along the optical axis, across, out from it, (3, 3)."""
-        back = -self.camera.forward
-        level = self.axes[0]
-        return np.stack([back, self.axes[1], unit(level - (level @ back) * back)])
-
-    @property
-    def axis(self) -> float:
-        """Out to what the camera stands on."""
-        return float(self.spec.frame.camera_axis_mm)
-
-    @property
-    def radius(self) -> float:
-        """Out to the camera plate; between this and the axis is the fence's step."""
-        return plate_face(self.axis, self.chosen.lens_radius) if self.chosen else self.axis
-
-    @property
-    def riser(self) -> float:
-        """Height of the fence's step; 0 without."""
-        return self.radius - self.axis
-
-    @property
-    def back(self) -> float:
-        """Behind the pinhole to the camera's back."""
-        return float(self.spec.frame.camera_back_mm)
-
-    @property
-    def tripod(self) -> float:
-        """Behind the pinhole to the tripod thread."""
-        return float(self.spec.frame.camera_screw_mm)
-
-    @property
-    def fence_height(self) -> float:
-        """From the camera plate to the fence's edge."""
-        return max(FENCE_HEIGHT_MM, self.riser + FENCE_LIP_MM)
-
-    @property
-    def bracket_at(self) -> float:
-        """Out to the bracket's face."""
-        return self.radius + PLATE_MM + GAP_MM
-
-    @property
-    def along(self) -> float:
-        """Travel of the camera along its axis to either side."""
-        return self.spec.frame.camera_travel_mm / 2
-
-    @property
-    def fence_screws(self) -> float:
-        """Behind the pinhole to the fence's screws."""
-        return self.back + FENCE_MM / 2
-
-    @property
-    def fence_travel(self) -> float:
-        """Of the fence's slots to either side: that of the camera, and what yaw needs."""
-        return self.along + FENCE_SCREW_MM * float(np.tan(np.radians(YAW_DEG)))
-
-    @property
-    def plate_end(self) -> float:
-        """Behind the pinhole to the camera plate's end."""
-        fence = self.fence_screws + self.fence_travel + M5_HOLE_MM / 2
-        lowest = float(self.screws[-1, 0]) + self.insert["outer_mm"] / 2
-        return max(fence, lowest) + PLATE_END_MM
-
-    @property
-    def recess(self) -> float:
-        """Half length of the recess for the tripod screw's head."""
-        return self.along + TRIPOD_HOLE_MM + RECESS_BEYOND_MM
-
-    @property
-    def window(self) -> float:
-        """Half length of the window for its key."""
-        return self.along + TRIPOD_HOLE_MM / 2
-
-    @property
-    def screws(self) -> Floats:
-        """Places (3, 2) of the three screws: behind the pinhole, and across."""
-        upper = TOP_MM + UPPER_MM
-        beyond = self.tripod + self.recess + self.insert["outer_mm"]
-        lower = max(TOP_MM + LOWER_MM, beyond)
-        return np.array([[upper, -PAIR_MM], [upper, PAIR_MM], [lower, 0.0]])
-
-    def point(self, back: float, across: float, out: float) -> Floats:
-        """A point (3,) of the camera's own axes, in the frame of the shell."""
-        return np.asarray(self.camera.pinhole + np.array([back, across, out]) @ self.own)
-
-    def block(self, low: tuple[float, float, float], high: tuple[float, float, float]) -> Prism:
-        """A box between two points of the camera's own axes."""
-        local = box(low, high, self.own)
-        return Prism(local.corners + self.camera.pinhole, local.along)
-
-    def hole(self, back: float, across: float, out: tuple[float, float], size: float) -> Primitive:
-        """A hole of a diameter out from the axis, between two distances."""
-        start, end = (self.point(back, across, one) for one in out)
-        return cylinder_between(start, end, size / 2)
-
-    def slot(
-        self, place: tuple[float, float], along: int, travel: float, out: tuple[float, float]
-    ) -> Primitive:
-        """A slot of M5 about a place, along one of the own axes, with a travel to either side."""
-        start = self.point(*place, out[0])
-        depth = (out[1] - out[0]) * self.own[2]
-        return slot(start, self.own[along], 2 * travel, M5_HOLE_MM / 2, depth)
 
 
 def camera_mount(site: Site, _: FrameLayout) -> CameraMount | None:
@@ -252,16 +121,16 @@ def check_camera(spec: Spec, array: MirrorArray, parts: Parts) -> None:
     _checked_place(spec, array, frame_axes(unit(array.camera.pinhole)), parts)
 
 
-def _checked_place(spec: Spec, array: MirrorArray, axes: Floats, parts: Parts) -> _Place | None:
+def _checked_place(spec: Spec, array: MirrorArray, axes: Floats, parts: Parts) -> MountPlace | None:
     if not spec.prototype.camera_diameter_mm:
         return None
     keys, chosen = with_camera(spec, array).prototype, chosen_camera(spec, array)
-    place = _Place(keys, axes, array.camera, parts[INSERT], chosen)
+    place = MountPlace(keys, axes, array.camera, parts[INSERT], chosen)
     _check_camera(place, _camera(place))
     return place
 
 
-def _camera(place: _Place) -> tuple[Component, ...]:
+def _camera(place: MountPlace) -> tuple[Component, ...]:
     """The camera's outline and its lens, or a cylinder in their place."""
     camera, chosen = place.camera, place.chosen
     if chosen is None:
@@ -278,7 +147,7 @@ def _camera(place: _Place) -> tuple[Component, ...]:
     )
 
 
-def _fasteners(place: _Place, parts: Parts) -> tuple[Fastener, ...]:
+def _fasteners(place: MountPlace, parts: Parts) -> tuple[Fastener, ...]:
     """Three screws with two nuts and two washers each, two of the fence, the tripod screw."""
     screws = [
         *(_tilting_screw(place, back, across, parts) for back, across in place.screws.tolist()),
@@ -292,14 +161,16 @@ def _fasteners(place: _Place, parts: Parts) -> tuple[Fastener, ...]:
     return (*(one for some in screws for one in some), tripod)
 
 
-def _tripod_screw(place: _Place, parts: Parts) -> tuple[PurchasedPart, float]:
+def _tripod_screw(place: MountPlace, parts: Parts) -> tuple[PurchasedPart, float]:
     """The tripod screw, and what its head leaves of the plate."""
     length = TRIPOD_MM + place.riser + IN_CAMERA_MM
     screw = choose_screw(parts, TRIPOD_THREAD_MM, length)
     return screw, screw["length_mm"] - place.riser - IN_CAMERA_MM
 
 
-def _tilting_screw(place: _Place, back: float, across: float, parts: Parts) -> tuple[Fastener, ...]:
+def _tilting_screw(
+    place: MountPlace, back: float, across: float, parts: Parts
+) -> tuple[Fastener, ...]:
     """A screw through the bracket into the plate's insert, with a nut against either."""
     flange, out = place.spec.frame.flange_mm, place.own[2]
     length = WASHER_MM + flange + GAP_MM + OUT_MM + MIN_ENGAGEMENT_MM
@@ -320,7 +191,7 @@ def _tilting_screw(place: _Place, back: float, across: float, parts: Parts) -> t
     )
 
 
-def _fence_screw(place: _Place, across: float, parts: Parts) -> tuple[Fastener, ...]:
+def _fence_screw(place: MountPlace, across: float, parts: Parts) -> tuple[Fastener, ...]:
     """A screw from the fence through the plate into a nut on a washer."""
     out, plate = place.own[2], ("camera_plate",)
     length = place.fence_height - HEAD_DEPTH_MM + PLATE_MM + WASHER_MM + NUT_MM
@@ -336,7 +207,7 @@ def _fence_screw(place: _Place, across: float, parts: Parts) -> tuple[Fastener, 
     )
 
 
-def _plate(place: _Place, parts: Parts) -> Component:
+def _plate(place: MountPlace, parts: Parts) -> Component:
     """The plate that carries the camera: inserts for three screws, slots for tripod and fence."""
     near, far = place.radius, place.radius + PLATE_MM
     through = (near - THROUGH_MM, far + THROUGH_MM)
@@ -362,11 +233,11 @@ def _plate(place: _Place, parts: Parts) -> Component:
     return Component("camera_plate", what, (body,), tuple(removed), (-out, out))
 
 
-def _has_step(place: _Place) -> bool:
+def _has_step(place: MountPlace) -> bool:
     return place.chosen is not None and place.riser > 0
 
 
-def _step(place: _Place) -> tuple[Primitive, Primitive]:
+def _step(place: MountPlace) -> tuple[Primitive, Primitive]:
     """The step that keeps the lens clear of the plate, and the hole of the tripod screw in it."""
     assert place.chosen is not None
     start, half = place.chosen.flange + RISER_END_MM, max(RISER_HALF_MM, place.chosen.half_width)
@@ -376,7 +247,7 @@ def _step(place: _Place) -> tuple[Primitive, Primitive]:
     return body, place.hole(place.tripod, 0.0, ends, TRIPOD_HOLE_MM)
 
 
-def _fence(place: _Place) -> Component:
+def _fence(place: MountPlace) -> Component:
     """The bar below the camera that its back lies against, with its step where it needs one."""
     near, far = place.radius - place.fence_height, place.radius
     start = place.back
@@ -397,7 +268,7 @@ def _fence(place: _Place) -> Component:
     return Component("camera_fence", what, tuple(added), tuple(removed), (out, -out))
 
 
-def _bracket(place: _Place) -> Bracket:
+def _bracket(place: MountPlace) -> Bracket:
     """The bracket on the base plate: slots across for three screws, a window for the key."""
     frame, axes, low = place.spec.frame, place.axes, place.spec.frame.floor_mm
     near, far = place.bracket_at, place.bracket_at + frame.flange_mm
@@ -446,7 +317,7 @@ def _bracket(place: _Place) -> Bracket:
     return Bracket(component, holes, np.array([[first, -half], [end, half]]))
 
 
-def _check_camera(place: _Place, bodies: tuple[Component, ...]) -> None:
+def _check_camera(place: MountPlace, bodies: tuple[Component, ...]) -> None:
     frame, along, chosen = place.spec.frame, place.along, place.chosen
     if abs(float(place.camera.forward @ place.axes[1])) > AXIAL:
         raise SpecError(
@@ -484,30 +355,15 @@ def _check_camera(place: _Place, bodies: tuple[Component, ...]) -> None:
     "Bracket, plate and fence of the camera",
     *("camera_bracket", "camera_plate", "camera_fence", "camera", "camera_lens"),
 )
-def camera_step(machine: AssembledMachine) -> Words:
+def camera_step(machine: AssembledMachine) -> Values:
     """The camera's mount."""
-    made_for = machine.has("camera_lens")
-    on_step = {"camera_fence", "camera"}
-    stands = any(on_step <= {*one.through} for one in machine.fasteners)
-    step = when(stands, " on the fence's step")
-    does = [
-        "Press the inserts into the camera plate from behind.",
-        "Bracket on the base plate with washers, in the middle of its slots.",
-        "Three long screws with washers from behind through the bracket's slots; on each between "
-        "bracket and plate a washer and two nuts, then into the plate's inserts. "
-        f"{GAP_MM:g} mm between plate and bracket. The nut at the plate locks the screw, the other "
-        "one clamps the bracket.",
-        "Camera and lens are not in the list: camera.json has what they must do, and tbcad camera "
-        "shows which on sale do it."
-        + when(made_for, " The mount is made for the camera and the lens that the picture names."),
-        f"Fence on the plate. Then your camera{step} by its tripod thread, through the plate, its "
-        "back against the fence.",
-    ]
-    checks = [
-        f"The gap between plate and bracket is {GAP_MM:g} mm at all three screws, to 0.5 mm.",
-        "The camera looks at the object, and cannot be turned on its screw by hand.",
-    ]
-    return does, checks
+    stands = any({"camera_fence", "camera"} <= {*one.through} for one in machine.fasteners)
+    named = " The mount is made for the camera and the lens that the picture names."
+    return {
+        "gap": GAP_MM,
+        "made_for": when(machine.has("camera_lens"), named),
+        "step": when(stands, " on the fence's step"),
+    }
 
 
 CAMERA = Part((camera_step,), camera_mount, remedies={"camera*": REMEDY})

@@ -14,7 +14,7 @@ from tbcad.core.camera.lists import CameraBody, RectilinearLens, load_cameras, l
 from tbcad.core.camera.requirements import camera_requirements
 from tbcad.core.camera.sheet import Candidate, behind_pupil, candidates
 from tbcad.core.mirrors.array import MirrorArray
-from tbcad.core.spec.design import Spec
+from tbcad.core.spec.design import Spec, spec_with
 from tbcad.core.spec.errors import SpecError, short_text
 from tbcad.core.spec.prototype import FrameSpec, PrototypeSpec
 from tbcad.core.spec.section import AUTO
@@ -151,8 +151,7 @@ def with_camera(spec: Spec, array: MirrorArray) -> Spec:
     sizes |= chosen.sizes if chosen else {}
     values = {key: value for key, value in sizes.items() if getattr(frame, key) == AUTO}
     named = {"camera": chosen.name if chosen else NONE}
-    section = prototype.model_copy(update={"frame": frame.model_copy(update=values | named)})
-    return spec.model_copy(update={"prototype": section})
+    return spec_with(spec, prototype={"frame": frame.model_copy(update=values | named)})
 
 
 def _lists(frame: FrameSpec) -> tuple[list[CameraBody], list[RectilinearLens]]:

@@ -6,30 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tbcad.cad.drafting.dimensions import across, centre_cross, diameter
-from tbcad.cad.drafting.sheet import A4, BESIDE_MM, Sheet, drawing_room, notes, placed, sheet_frame
+from tbcad.cad.drafting.sheet import A4, BESIDE_MM, Sheet, drawing_room, notes, placed
 from tbcad.cad.formats.entities import Circle, Layer, Point
 from tbcad.core.geometry.primitives import Component, Cylinder, box
 from tbcad.core.geometry.rotations import bolt_circle
-from tbcad.prototype.assembly_steps.machine import (
-    AssembledMachine,
-    Words,
-    planned,
-    told_words,
-    when,
-)
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned, when
 from tbcad.prototype.base.fasteners import COUPLING_FLANGE_MM
 from tbcad.prototype.base.hub import PATTERNS, SCREW_MM, SOCKET_MM
 from tbcad.prototype.base.layout import BaseLayout
 from tbcad.prototype.drive.drive import Drive, pitch_diameter
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import PartsList
-from tbcad.prototype.frame.shared import (
-    GAP_MM,
-    OVERLAP_MM,
-    PLATE_MM,
-    THROUGH_MM,
-    HeadPlate,
-)
+from tbcad.prototype.frame.shared import GAP_MM, OVERLAP_MM, PLATE_MM, THROUGH_MM, HeadPlate
 from tbcad.prototype.part import FrameLayout, Part, Site
 from tbcad.prototype.purchased.parts import PurchasedPart, choose_screw
 from tbcad.prototype.sheets import ASIDE_MM, fitted, title_block
@@ -204,13 +192,13 @@ def motor_fasteners(site: Site, plate: HeadPlate) -> Iterator[Fastener]:
 
 
 @planned("Rotary stage on the head", "rotary_stage*")
-def table_step(machine: AssembledMachine) -> Words:
+def table_step(machine: AssembledMachine) -> Values:
     """The rotary stage."""
-    return told_words(__name__, "table")
+    return {}
 
 
 @planned("Zero disc on the hub", "zero_disc", "wheel", "coupling")
-def hub_step(machine: AssembledMachine) -> Words:
+def hub_step(machine: AssembledMachine) -> Values:
     """Zero disc, and what drives it, on the hub."""
     part = sheet = None
     if wheel := machine.bodies.get("wheel"):
@@ -219,56 +207,51 @@ def hub_step(machine: AssembledMachine) -> Words:
         f" The shaft {machine.body_ref('shaft')} through wheel, disc and hub centres them while "
         "the screws are tightened; pull it out again."
     )
-    return told_words(
-        __name__,
-        "hub",
-        disc=machine.body_ref("zero_disc"),
-        drill=when(sheet, f"Drill the wheel as {sheet} shows. "),
-        centred=centred or "",
-        wheel=wheel and (f"the wheel of {part['teeth']:.0f} teeth" if part else "the wheel"),
-        no_wheel=not wheel,
-        coupling=machine.has("coupling"),
-        stage=machine.has("rotary_stage"),
-    )
+    return {
+        "disc": machine.body_ref("zero_disc"),
+        "drill": when(sheet, f"Drill the wheel as {sheet} shows. "),
+        "centred": centred or "",
+        "wheel": wheel and (f"the wheel of {part['teeth']:.0f} teeth" if part else "the wheel"),
+        "no_wheel": not wheel,
+        "coupling": machine.has("coupling"),
+        "stage": machine.has("rotary_stage"),
+    }
 
 
 @planned("Base on its shaft", "shaft", "spacer", "collar", loose=("belts",), near=NEAR_SHAFT)
-def shaft_step(machine: AssembledMachine) -> Words:
+def shaft_step(machine: AssembledMachine) -> Values:
     """The base on its shaft."""
     shaft, wheel = machine.body_ref("shaft"), machine.has("wheel")
-    return told_words(
-        __name__,
-        "shaft",
-        shaft=shaft,
-        spacer=machine.body_ref("spacer"),
-        socket_mm=SOCKET_MM,
-        wheel=wheel,
-        play=AXIAL_PLAY_MM,
-        most=AXIAL_PLAY_MM + PLAY_STEP_MM,
-    )
+    return {
+        "shaft": shaft,
+        "spacer": machine.body_ref("spacer"),
+        "socket_mm": SOCKET_MM,
+        "wheel": wheel,
+        "play": AXIAL_PLAY_MM,
+        "most": AXIAL_PLAY_MM + PLAY_STEP_MM,
+    }
 
 
 @planned("Motor", "motor", "brake", "pinion", near=("wheel",))
-def motor_step(machine: AssembledMachine) -> Words:
+def motor_step(machine: AssembledMachine) -> Values:
     """The motor, with belt, or straight on the shaft."""
-    brake = machine.has("brake") and machine.body_ref("brake")
-    if not machine.has("pinion"):
-        return told_words(__name__, "motor", coupling=machine.has("coupling"), brake=brake)
-    wheel, motor = (machine.listed(machine.bodies[body]) for body in ("wheel", "motor"))
-    front = PLATE_MM + GAP_MM + (wheel["width_mm"] if wheel else 0.0)
-    shaft = motor["shaft_length_mm"] if motor else 0.0
-    return told_words(
-        __name__,
-        "belt",
-        parts=wheel and motor,
-        brake=brake,
-        pinion=machine.body_ref("pinion"),
-        front=front,  # so that the pinion's teeth are in line with the wheel's
-        shaft_mm=shaft,
-        apart=abs(shaft - front),
-        beyond="beyond" if shaft > front else "before",
-        drive=machine.record.drive,
-    )
+    belt, brake = machine.has("pinion"), machine.has("brake") and machine.body_ref("brake")
+    coupling = machine.has("coupling")
+    values: Values = {"belt": belt, "direct": not belt, "brake": brake, "coupling": coupling}
+    values |= {"drive": machine.record.drive}
+    wheel, motor = (machine.listed(machine.bodies.get(body, "")) for body in ("wheel", "motor"))
+    if not (belt and wheel and motor):
+        return values | {"parts": False}
+    front = PLATE_MM + GAP_MM + wheel["width_mm"]
+    shaft = motor["shaft_length_mm"]
+    return values | {
+        "parts": True,
+        "pinion": machine.body_ref("pinion"),
+        "front": front,  # so that the pinion's teeth are in line with the wheel's
+        "shaft_mm": shaft,
+        "apart": abs(shaft - front),
+        "beyond": "beyond" if shaft > front else "before",
+    }
 
 
 def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: PartsList) -> Sheet:
@@ -286,7 +269,6 @@ def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: PartsList) -> Sheet
     on_circle = Circle(Layer.CENTRE, (0, 0), circle / 2)
     drawn = placed([*outline, *holes, on_circle], origin, scale)
     circles = [one for one in drawn if isinstance(one, Circle) and one.layer == Layer.CUT]
-    title = "driven wheel"
     angle = float(np.degrees(np.arctan2(places[0][1], places[0][0])))
     on_holes = f"{len(holes)} x Ø<> on Ø{circle:g}"
     text = (
@@ -300,8 +282,8 @@ def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: PartsList) -> Sheet
     )
     ring, bore, first = circles[0], circles[1], circles[2]
     right, top = origin[0] + ring.radius, ring.centre[1] + ring.radius
+    block = title_block(bill, "driven wheel", part, "on the face at the zero disc")
     entities = [
-        *sheet_frame(paper, scale, title_block(bill, title, part, "on the face at the zero disc")),
         *drawn,
         *(line for one in (ring, *circles[2:]) for line in centre_cross(one)),
         across(
@@ -315,7 +297,7 @@ def wheel_sheet(base: BaseLayout, part: PurchasedPart, bill: PartsList) -> Sheet
         diameter(bore, *_called(bore, (right, origin[1])), f"{part['bore_mm']:g}", "Ø<>"),
         *notes(corner, NOTES_MM - BESIDE_MM, text),
     ]
-    return Sheet(WHEEL, title, part.name, paper, scale, origin, tuple(entities))
+    return Sheet.framed((WHEEL, part.name), block, paper, scale, origin, entities)
 
 
 def _called(circle: Circle, corner: Point) -> tuple[Point, Point]:

@@ -19,7 +19,7 @@ from tbcad.core.geometry.primitives import (
 )
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import FrameSpec
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned
 from tbcad.prototype.base.fasteners import m3_insert
 from tbcad.prototype.base.hub import PIN_OUT_MM
 from tbcad.prototype.base.layout import BaseLayout
@@ -259,18 +259,9 @@ def _motor_holes(site: Site, plate: HeadPlate) -> list[Primitive]:
 
 
 @planned("Bearing head on the uprights", "bearing_*")
-def head_step(machine: AssembledMachine) -> Words:
+def head_step(machine: AssembledMachine) -> Values:
     """Bearings and head."""
-    bearings = machine.has("bearing_front")
-    seat = "Press a bearing into either side of the head, until it sits on its shoulder."
-    turns = "The shaft slides through both bearings by hand and turns without a rough spot."
-    does = [
-        when(machine.has("home_bracket"), "Press the inserts into the head's side."),
-        when(bearings, seat),
-        "Screw the head on the uprights with the T-nuts, its upper edge flush with their ends.",
-    ]
-    checks = ["A straight edge across both uprights' ends touches the head.", when(bearings, turns)]
-    return does, checks
+    return {"bracket": machine.has("home_bracket"), "bearings": machine.has("bearing_front")}
 
 
 HEAD = Part((head_step,), bearing_head)

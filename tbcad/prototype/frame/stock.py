@@ -15,32 +15,18 @@ from tbcad.cad.drafting.sheet import (
     Sheet,
     drawing_room,
     notes,
-    notes_beside_title,
     placed,
-    sheet_frame,
     table,
 )
 from tbcad.cad.drafting.sheet import rectangle as outline
 from tbcad.cad.formats.entities import Circle, Entity, Layer, Line, Point, Text
 from tbcad.core.geometry.primitives import Component, box
 from tbcad.core.spec.errors import SpecError
-from tbcad.prototype.assembly_steps.machine import (
-    AssembledMachine,
-    Words,
-    planned,
-    told_words,
-    when,
-)
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned, when
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.files.bom import PartsList
 from tbcad.prototype.frame.corner import CORNER, StandingBar
-from tbcad.prototype.frame.shared import (
-    EXTRUSION_MM,
-    UPRIGHTS,
-    WASHER,
-    BearingHead,
-    drilled_holes,
-)
+from tbcad.prototype.frame.shared import EXTRUSION_MM, UPRIGHTS, WASHER, BearingHead, drilled_holes
 from tbcad.prototype.light.lamp import LampLayout
 from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
 from tbcad.prototype.purchased.parts import PurchasedPart, choose_part, choose_screw, of_kind
@@ -159,28 +145,26 @@ def _plate_fasteners(site: Site, brackets: Sequence[Bracket]) -> Iterator[Fasten
 
 
 @planned("Drill the plate, cut the uprights", "plate")
-def shop_step(machine: AssembledMachine) -> Words:
+def shop_step(machine: AssembledMachine) -> Values:
     """Plate and uprights as drawn; what must be matt black is blackened before it is mounted."""
     stock = machine.record.frame_stock
     plate, upright = map(machine.record.drawing_of, (stock.plate, stock.upright))
     finished = (one.name for one in machine.record.bought if one.finish and one.part)
     kinds = dict.fromkeys(SIDE_OR_NUMBER.sub("", name).replace("_", " ") for name in finished)
     black = ", ".join(kinds)
-    return told_words(
-        __name__,
-        "shop",
-        stock=stock,
-        plate=machine.ref(stock.plate),
-        plate_drawing=plate or HOLES,
-        upright=machine.ref(stock.upright),
-        upright_drawing=when(upright, f" ({upright})"),
-        black=black,
-        holes=HOLES,
-    )
+    return {
+        "stock": stock,
+        "plate": machine.ref(stock.plate),
+        "plate_drawing": plate or HOLES,
+        "upright": machine.ref(stock.upright),
+        "upright_drawing": when(upright, f" ({upright})"),
+        "black": black,
+        "holes": HOLES,
+    }
 
 
 @planned("Uprights on the plate", "upright_*")
-def frame_step(machine: AssembledMachine) -> Words:
+def frame_step(machine: AssembledMachine) -> Values:
     """Brackets and uprights; T-nuts in the front slot of each and in its back one."""
     axis = np.array(machine.record.frame.axis)
     some = [one for one in machine.fasteners if machine.kind(one.part) == "tnuts"]
@@ -188,7 +172,7 @@ def frame_step(machine: AssembledMachine) -> Words:
     # Screws go in from the front against the axis, which leans from the uprights to the camera.
     front = sum(along < 0 for along in nuts)
     back = len(nuts) - front
-    return told_words(__name__, "frame", front=front // len(UPRIGHTS), back=back // len(UPRIGHTS))
+    return {"front": front // len(UPRIGHTS), "back": back // len(UPRIGHTS)}
 
 
 def plate_sheet(stock: Stock, bill: PartsList) -> Sheet:
@@ -205,24 +189,22 @@ def plate_sheet(stock: Stock, bill: PartsList) -> Sheet:
     part_drawn = placed([outline((0, 0, *size), Layer.CUT), *holes], origin, scale)
     circles = [entity for entity in part_drawn if isinstance(entity, Circle)]
     numbers = [str(number) for number in range(1, len(holes) + 1)]
-    title = "base plate"
     text = (
         f"Plate {size[0]:g} x {size[1]:g} x {part['thickness_mm']:g}, bought to this size.",
         f"{len(holes)} x M5: drill {TAPPED_M5_MM:g} through, tap through.",
         "x runs from the uprights to the camera, both axes from the corner at the arrows.",
         "Seen from the side that carries the brackets. Deburr all edges.",
     )
+    block = title_block(bill, "base plate", part, "from above")
     entities = [
-        *sheet_frame(paper, scale, title_block(bill, title, part, "from above")),
         *part_drawn,
         *(line for circle in circles for line in centre_cross(circle)),
         *labels(circles, numbers),
         *outer(origin, (size[0] * scale, size[1] * scale), size),
         *_datum(origin),
         *table((left_of_table, high), TABLE_MM, (TABLE_HEAD, *_hole_cells(stock))),
-        *notes_beside_title(paper, text),
     ]
-    return Sheet(PLATE, title, part.name, paper, scale, origin, tuple(entities))
+    return Sheet.framed((PLATE, part.name), block, paper, scale, origin, entities, text)
 
 
 def _datum(origin: Point) -> Iterator[Entity]:
@@ -262,7 +244,6 @@ def upright_sheet(stock: Stock, screws: Sequence[float], bill: PartsList) -> She
     drawn = placed([outline((0, 0, length, side), Layer.CUT), *lines], origin, scale)
     centre = origin[1] + side * scale / 2
     heights = sorted(z - stock.floor for z in screws)
-    title = "upright"
     text = (
         f"Saw from {part.what}.",
         f"Length {length:.1f} ± {CUT_MM:g}, both of the same length to 0.2; ends square to 0.2.",
@@ -270,14 +251,14 @@ def upright_sheet(stock: Stock, screws: Sequence[float], bill: PartsList) -> She
         *LAMP_NOTES[len(heights)],
     )
     entities = [
-        *sheet_frame(paper, scale, title_block(bill, title, part, "from the side")),
         *drawn,
         Line(Layer.CENTRE, (origin[0] - 4, centre), (origin[0] + length * scale + 4, centre)),
         *outer(origin, (length * scale, side * scale), (round(length, 1), side)),
         *_heights(origin, side, heights, scale),
         *notes((left + BESIDE_MM, middle), right - left - 2 * BESIDE_MM, text),
     ]
-    return Sheet(UPRIGHT, title, part.name, paper, scale, origin, tuple(entities))
+    block = title_block(bill, "upright", part, "from the side")
+    return Sheet.framed((UPRIGHT, part.name), block, paper, scale, origin, entities)
 
 
 def _heights(

@@ -12,21 +12,12 @@ from itertools import product
 import numpy as np
 
 from tbcad.cad.drafting.dimensions import upward
-from tbcad.cad.drafting.sheet import (
-    A4,
-    BESIDE_MM,
-    Sheet,
-    drawing_room,
-    notes,
-    placed,
-    rectangle,
-    sheet_frame,
-)
+from tbcad.cad.drafting.sheet import A4, BESIDE_MM, Sheet, drawing_room, notes, placed, rectangle
 from tbcad.cad.formats.entities import Layer, Line
 from tbcad.core.geometry.primitives import Component, Primitive, enclosing_triangles
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.section import AUTO
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, when
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned, when
 from tbcad.prototype.files.bom import PartsList
 from tbcad.prototype.frame.camera_mount import CameraMount
 from tbcad.prototype.frame.shared import EXTRUSION_MM, BearingHead
@@ -175,34 +166,23 @@ def _box(body: Primitive) -> tuple[Floats, Floats]:
 
 
 @planned("Lamps", "lamp_*", loose=("strips",), near=("plate",))
-def lamps_step(machine: AssembledMachine) -> Words:
+def lamps_step(machine: AssembledMachine) -> Values:
     """Posts, holders and strips."""
     light = machine.record.lamps
     assert light is not None
     drawing = machine.record.drawing_of(light.strip)
     post = next(one for one in machine.record.bought if one.name == POSTS[0])
-    does = [
-        f"Saw both posts from {machine.ref(post.part or '')}: {post.what.rpartition(', ')[2]}, "
-        "ends square to 0.2 mm. Deburr them.",
-        "Slide their T-nuts in, stand them on the plate in their corner brackets, on both sides "
-        "of the camera's place, and screw them down; the plate's drawing says which holes are "
-        "theirs.",
-        "Screw the holders with their T-nuts on the fronts of the uprights, as high as the "
-        "upright's drawing has it"
-        + when(machine.has("lamp_holder_1"), ", and on the posts, flush with their upper ends")
-        + ".",
-        f"Cut the strip {machine.ref(light.strip)} at its marks: {light.strips} pieces of "
-        f"{light.length_mm:.0f} mm for each of the {len(light.places)} lamps"
-        f"{when(drawing, f' ({drawing})')}. Solder a cable to each piece, plus to plus.",
-        "Stick them on the lamps' faces, toward the object: on the holders"
-        + when(not machine.has("lamp_holder_1"), " and on the posts themselves")
-        + ".",
-    ]
-    checks = [
-        f"At 24 V all of them light up and draw {light.current_ma:.0f} mA together.",
-        "All of them shine at the object, and stand alike on both sides of it.",
-    ]
-    return does, checks
+    held = machine.has("lamp_holder_1")  # the lamps on the posts too, not stuck on these
+    return {
+        "light": light,
+        "count": len(light.places),
+        "post": machine.ref(post.part or ""),
+        "cut": post.what.rpartition(", ")[2],
+        "strip": machine.ref(light.strip),
+        "drawing": when(drawing, f" ({drawing})"),
+        "on_posts": when(held, ", and on the posts, flush with their upper ends"),
+        "themselves": when(not held, " and on the posts themselves"),
+    }
 
 
 def lamp_sheet(lamps: LampLayout, bill: PartsList) -> Sheet:
@@ -222,7 +202,6 @@ def lamp_sheet(lamps: LampLayout, bill: PartsList) -> Sheet:
     drawn = placed([*strips, *uncut], origin, scale)
     x, y = origin[0] + lamps.length * scale, origin[1]  # beside it, the width of a strip
     of_one = upward((x, y), (x, y + wide * scale), x + BESIDE_STRIPS_MM, f"{wide:g}")
-    title = "strips of a lamp"
     text = (
         f"Cut {pieces} pieces of {lamps.length:g} \u00b1 {STRIP_CUT_MM:g}, {lamps.strips} for each "
         f"of {len(lamps.places)} lamps, at marks every {part['cut_mm']:g}, through the copper "
@@ -232,14 +211,14 @@ def lamp_sheet(lamps: LampLayout, bill: PartsList) -> Sheet:
         f"{part['supply_v']:g} V, {part['watt_m'] * lamps.length / part['supply_v']:.0f} "
         "mA for each piece; all pieces in parallel.",
     )
+    block = title_block(bill, "strips of a lamp", part, "on the shining face")
     entities = [
-        *sheet_frame(paper, scale, title_block(bill, title, part, "on the shining face")),
         *drawn,
         *outer(origin, (size[0] * scale, size[1] * scale), size),
         *([of_one] if lamps.strips > 1 else []),
         *notes((left + BESIDE_MM, middle), right - left - 2 * BESIDE_MM, text),
     ]
-    return Sheet(LAMP, title, part.name, paper, scale, origin, tuple(entities))
+    return Sheet.framed((LAMP, part.name), block, paper, scale, origin, entities)
 
 
 def _place_note(lamps: LampLayout) -> str:

@@ -16,7 +16,7 @@ from tbcad.core.geometry.rotations import even_angles, rotated, unit_circle
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.prototype import LightSpec
 from tbcad.core.spec.section import AUTO
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, told_words
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned
 from tbcad.prototype.keepout import KeepOut
 from tbcad.prototype.part import Part
 from tbcad.prototype.purchased.parts import Parts, PurchasedPart, of_kind
@@ -212,11 +212,11 @@ def _swept(keep_out: KeepOut, section: Floats, first: float, last: float) -> Flo
 
 
 @planned("Shroud", "shroud_*", loose=("sheets",))
-def shroud_step(machine: AssembledMachine) -> Words:
+def shroud_step(machine: AssembledMachine) -> Values:
     """The box of card."""
     box = machine.record.shroud
     assert box is not None
-    return told_words(__name__, "shroud", panels=[{"one": one} for one in box.panels])
+    return {"panels": [{"one": one} for one in box.panels]}
 
 
 SHROUD = Part((shroud_step,))

@@ -17,7 +17,7 @@ from tbcad.core.geometry.vectors import norm, unit
 from tbcad.core.optics.lamp_light import RectangularLamps, irradiance, lambertian
 from tbcad.core.spec.errors import SpecError
 from tbcad.core.spec.section import AUTO
-from tbcad.prototype.assembly_steps.machine import AssembledMachine, Words, planned, told_words
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned
 from tbcad.prototype.base.fasteners import m3_insert
 from tbcad.prototype.fasteners import Fastener
 from tbcad.prototype.keepout import min_distance
@@ -339,7 +339,7 @@ def _set_screw(site: Site, pair: _Pair) -> tuple[Fastener, ...]:
 
 
 @planned("Upper lamps", NAMES, near=("stage_post",))
-def upper_step(machine: AssembledMachine) -> Words:
+def upper_step(machine: AssembledMachine) -> Values:
     """Bar, rods and LEDs above the object."""
     lamps = machine.record.lamps
     assert lamps is not None
@@ -348,19 +348,17 @@ def upper_step(machine: AssembledMachine) -> Words:
     rod = np.array(upper.leds[0].rod_mm)
     lengths = norm(np.diff(rod, axis=0))
     cosine = float(unit(rod[1] - rod[0]) @ unit(rod[2] - rod[1]))
-    return told_words(
-        __name__,
-        "upper",
-        led=machine.ref(upper.part),
-        rod=machine.ref(ROD),
-        length=float(lengths.sum()),
-        end=float(lengths[0]),
-        bend=math.degrees(math.acos(min(cosine, 1.0))),
-        aside=abs(upper.leds[0].position_mm[1]),
-        height=upper.leds[0].position_mm[2],
-        tolerance=upper.tolerance_mm,
-        current=upper.current_ma,
-    )
+    return {
+        "led": machine.ref(upper.part),
+        "rod": machine.ref(ROD),
+        "length": float(lengths.sum()),
+        "end": float(lengths[0]),
+        "bend": math.degrees(math.acos(min(cosine, 1.0))),
+        "aside": abs(upper.leds[0].position_mm[1]),
+        "height": upper.leds[0].position_mm[2],
+        "tolerance": upper.tolerance_mm,
+        "current": upper.current_ma,
+    }
 
 
 UPPER = Part(

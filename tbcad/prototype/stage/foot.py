@@ -3,13 +3,7 @@
 import numpy as np
 
 from tbcad.core.geometry.primitives import Component, Cylinder, box
-from tbcad.prototype.assembly_steps.machine import (
-    AssembledMachine,
-    Words,
-    planned,
-    told_words,
-    when,
-)
+from tbcad.prototype.assembly_steps.machine import AssembledMachine, Values, planned, when
 from tbcad.prototype.frame.shared import THROUGH_MM, drilled_holes
 from tbcad.prototype.part import Bracket, FrameLayout, Mounted, Part, Site
 from tbcad.prototype.stage.crown import PLUG_MM, WIRES_MM
@@ -64,26 +58,24 @@ def _clamp(stage: StageLayout, axes: Floats) -> Component:
 
 
 @planned("Object stage", "stage_*", loose=("WIRE-28", "WIRE-30"))
-def stage_step(machine: AssembledMachine) -> Words:
+def stage_step(machine: AssembledMachine) -> Values:
     """The object's stage with its LEDs; x is toward the camera, y to its right as it looks back."""
     leds = [_led_place(k, *one.position_mm) for k, one in enumerate(machine.record.leds, 1)]
     post = next(one for one in machine.record.bought if one.name == "stage_post")
     clamp = machine.parts[machine.bodies["stage_foot"]]
-    return told_words(
-        __name__,
-        "stage",
-        tube=machine.ref(post.part or ""),
-        cut=post.what.rpartition(", ")[2],
-        below=PLUG_MM / 2,
-        above=wires_up(clamp),
-        wires=min(WIRES_MM, clamp["bore_mm"] / 2),
-        leds=leds,
-        count=len(leds),
-        wired=when(leds, "Wires through the post. "),
-        turned=when(leds, ", turned so that the LEDs stand as the checks say"),
-        braked=when(machine.has("brake"), " (with 24 V on the brake)"),
-        plugged=when(leds, " A plug on the wires lets it be taken out."),
-    )
+    return {
+        "tube": machine.ref(post.part or ""),
+        "cut": post.what.rpartition(", ")[2],
+        "below": PLUG_MM / 2,
+        "above": wires_up(clamp),
+        "wires": min(WIRES_MM, clamp["bore_mm"] / 2),
+        "leds": leds,
+        "count": len(leds),
+        "wired": when(leds, "Wires through the post. "),
+        "turned": when(leds, ", turned so that the LEDs stand as the checks say"),
+        "braked": when(machine.has("brake"), " (with 24 V on the brake)"),
+        "plugged": when(leds, " A plug on the wires lets it be taken out."),
+    }
 
 
 def _led_place(number: int, x: float, y: float, z: float) -> dict[str, object]:

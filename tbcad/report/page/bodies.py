@@ -14,12 +14,7 @@ from tbcad.cad.formats.checked_files import columns
 from tbcad.cad.formats.glb import ColouredMesh, read_glb
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.core.geometry.conics import Ellipsoid
-from tbcad.core.geometry.primitives import (
-    Cylinder,
-    Primitive,
-    enclosing_triangles,
-    revolved_along,
-)
+from tbcad.core.geometry.primitives import Cylinder, Primitive, enclosing_triangles, revolved_along
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.design import MeshSpec, Spec

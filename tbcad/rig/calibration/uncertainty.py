@@ -19,7 +19,8 @@ from tbcad.core.geometry.vectors import perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.rig.calibration.estimate.jacobian import light_images, reflections
-from tbcad.rig.calibration.estimate.parameters import Prior, covariances
+from tbcad.rig.calibration.estimate.parameters import Prior
+from tbcad.rig.calibration.estimate.slopes import covariances
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Floats, Ints
 

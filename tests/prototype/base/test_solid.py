@@ -319,7 +319,8 @@ def test_a_lost_pad_is_noticed(base: BaseLayout) -> None:
     seats = base.seats
     boss, pads = seat_solids.boss_solid(seats, 0), np.full(3, seats.pad[0])
     whole = cut(boss, [seat_solids.seat_hollow(seats, 0)])
-    contacts, inward = -seats.radius[0] * seats.local_normals[0], -seats.local_normals[0][2]
+    contacts = -(seats.radius[0] + seats.pad_offset) * seats.local_normals[0]
+    inward = -seats.local_normals[0][2]
     check_pads("seat", whole, contacts, pads)
     check_pads("seat", whole, contacts[:0], pads[:0])
     damaged = cut(whole, [cylinder(contacts[1] + 0.5 * UP, UP, 1.0, 5.0)])

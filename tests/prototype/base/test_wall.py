@@ -8,16 +8,9 @@ from tbcad.cad.kernel.solids import faces, polyhedron, revolved_polygon
 from tbcad.core.geometry.vectors import norm
 from tbcad.core.spec.prototype import BaseSpec
 from tbcad.prototype.balls.layout import PrototypeLayout
+from tbcad.prototype.base.gaps import MIN_PART_MM, STEP_MM, rib_gaps, ring_arcs
 from tbcad.prototype.base.layout import FACETS_OUT_MM, BaseLayout, base_layout
-from tbcad.prototype.base.solid import (
-    MIN_PART_MM,
-    STEP_MM,
-    facet_count,
-    rib_gaps,
-    ring_arcs,
-    wall_facets,
-    wall_section,
-)
+from tbcad.prototype.base.solid import facet_count, wall_facets, wall_section
 
 
 @pytest.fixture(scope="module")

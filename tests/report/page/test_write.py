@@ -189,7 +189,7 @@ def test_without_shells_there_is_a_map_and_no_model(export: Path) -> None:
         del manifest["files"][name]
         (export / name).unlink()
     path.write_text(json.dumps(manifest))
-    assert fingerprint(export / "design.json") == manifest["files"]["design.json"]
+    assert fingerprint(export / "design.json").model_dump() == manifest["files"]["design.json"]
     data = data_of(page(export))
     assert data["bodies"] == []
     assert len(data["mirrors"]["ids"]) == 98

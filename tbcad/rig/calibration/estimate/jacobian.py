@@ -27,15 +27,8 @@ from tbcad.core.optics.sphere_forms import (
     heights,
     term_heights,
 )
-from tbcad.rig.calibration.estimate.parameters import (
-    Block,
-    Of,
-    Prior,
-    Slopes,
-    camera_turns,
-    sphere_slopes,
-    turn_slopes,
-)
+from tbcad.rig.calibration.estimate.parameters import Block, Of, Prior
+from tbcad.rig.calibration.estimate.slopes import Slopes, camera_turns, sphere_slopes, turn_slopes
 from tbcad.rig.machine.machine import Machine
 from tbcad.types import Floats, Ints
 

@@ -18,7 +18,8 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Block, Prior, Slopes, covariances
+from tbcad.rig.calibration.estimate.parameters import Block, Prior
+from tbcad.rig.calibration.estimate.slopes import Slopes, covariances
 from tbcad.rig.machine.machine import Highlights, Machine
 from tbcad.types import Bools, Floats, Ints, Progress
 

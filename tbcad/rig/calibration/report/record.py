@@ -11,7 +11,8 @@ from tbcad.records.calibration import CalibrationRecord, ParameterBlock
 from tbcad.records.document import RecordSection
 from tbcad.records.run import exposure_name
 from tbcad.rig.calibration.calibrate import MachineCalibration
-from tbcad.rig.calibration.estimate.parameters import Block, Of, Slopes, base_slopes
+from tbcad.rig.calibration.estimate.parameters import Block, Of
+from tbcad.rig.calibration.estimate.slopes import Slopes, base_slopes
 from tbcad.rig.calibration.estimate.solve import Estimate
 from tbcad.rig.calibration.report.verdict import CalibrationVerdict, outliers, parameter_names
 from tbcad.rig.machine.designed import is_cap

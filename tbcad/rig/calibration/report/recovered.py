@@ -14,8 +14,8 @@ from tbcad.core.geometry.vectors import dot, norm, perpendicular_axes, unit
 from tbcad.core.optics.reflection import reflected_rays
 from tbcad.core.optics.sphere_forms import TERM_COUNT, ray_reach, surface_normals
 from tbcad.rig.calibration.calibrate import MachineCalibration
-from tbcad.rig.calibration.estimate.parameters import (
-    Block,
+from tbcad.rig.calibration.estimate.parameters import Block
+from tbcad.rig.calibration.estimate.slopes import (
     Slopes,
     base_slopes,
     camera_turns,

@@ -9,7 +9,8 @@ from tbcad.core.geometry.vectors import perpendicular_axes
 from tbcad.core.optics.sphere_forms import TERM_COUNT, Forms, sagitta
 from tbcad.errors import InputError
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes
-from tbcad.rig.calibration.estimate.parameters import Block, Prior, base_slopes
+from tbcad.rig.calibration.estimate.parameters import Block, Prior
+from tbcad.rig.calibration.estimate.slopes import base_slopes
 from tbcad.rig.calibration.estimate.solve import estimate
 from tbcad.rig.calibration.priors import prototype_prior
 from tbcad.rig.machine.designed import sag_motion

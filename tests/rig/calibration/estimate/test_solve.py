@@ -20,13 +20,8 @@ from tbcad.errors import InputError
 from tbcad.light.simulate.prototype.run import HALF_TURN
 from tbcad.light.simulate.scene.reflector import ExportedDesign, reflectors
 from tbcad.rig.calibration.estimate.jacobian import highlights_with_slopes, reflections
-from tbcad.rig.calibration.estimate.parameters import (
-    Block,
-    Prior,
-    base_slopes,
-    covariances,
-    prior_of,
-)
+from tbcad.rig.calibration.estimate.parameters import Block, Prior, prior_of
+from tbcad.rig.calibration.estimate.slopes import base_slopes, covariances
 from tbcad.rig.calibration.estimate.solve import Estimate, estimate, outlier_limit
 from tbcad.rig.calibration.led_layout import NUMBERS, only_spheres, ray_errors, shell_information
 from tbcad.rig.calibration.priors import (
