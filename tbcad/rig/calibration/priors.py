@@ -181,7 +181,7 @@ def _radii(
 
 def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:
     """Radii "BALL=MM" or "BALL=MM:SIGMA" as number from 0, radius and standard deviation, mm."""
-    measured = []
+    measured: list[tuple[int, float, float]] = []
     for text in texts:
         found = PATTERN.fullmatch(text.replace(" ", ""))
         try:
@@ -196,6 +196,11 @@ def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:
             raise InputError(
                 f"--measured {text}: allowed is ball 1 to {balls}, with a radius and its sigma "
                 "above 0 mm: change it"
+            )
+        if any(values[0] == number for number, _, _ in measured):
+            raise InputError(
+                f"--measured {text}: ball {ball} has a radius already: give one for each ball, of "
+                "several measurements their mean"
             )
         measured.append(values)
     return tuple(measured)

@@ -311,6 +311,11 @@ def test_wrong_texts_are_refused(text: str) -> None:
         parse_measured((text,), 5)
 
 
+def test_two_radii_of_one_ball_are_refused() -> None:
+    with pytest.raises(InputError, match="ball 1 has a radius already"):
+        parse_measured(("1=43.2", "2=34.61", "1=44"), 5)
+
+
 BUILDS = 8
 FIRST_SEED = 10  # of a machine: the lens of seed 5 nearly folds within its picture
 PRIOR = small_prior(small_machine(stops=3))
