@@ -32,6 +32,9 @@ those of a few balls do not tell it from k2."""
 MEASURED_MM = 0.01
 """Standard deviation of a radius that is measured without saying how well: by a micrometer screw
 over the body, or a spherometer."""
+# A measured radius that differs from the design by this factor is a diameter (2), another ball's,
+# or has its decimal point elsewhere: no process is so far off, flat polished caps included.
+MISREAD = 1.75
 PATTERN = re.compile(r"(\d{1,4})=([0-9.]{1,12})(?::([0-9.]{1,12}))?")
 Measured = tuple[tuple[int, float, float], ...]
 
@@ -53,10 +56,11 @@ def prototype_prior(
     their spheres'. Each frame belongs to a series, (f,). The base's angle zero has a half width in
     radians.
     A known lens is fixed; measured radii have numbers of spheres, values and standard deviations,
-    mm.
+    mm. InputError: a measured radius is no radius of that sphere.
     """
-    cap = norm(machine.centre - seat) > 0
+    cap, designed = norm(machine.centre - seat) > 0, machine.radius
     machine, powers = _powers(machine, errors, measured)
+    _check_measured(measured, designed)
     with_form = 0.0 * powers if machine.forms is None else np.sign(machine.forms.half_aperture)
     balls = [one for one in measured if not with_form[one[0]]]
     radius, radii = _radii(machine, errors, cap, balls)
@@ -168,6 +172,16 @@ def _powers(machine: Machine, errors: Errors, measured: Measured) -> tuple[Machi
     return replace(machine, radius=radius, centre=centre), sigma
 
 
+def _check_measured(measured: Measured, designed: Floats) -> None:
+    for number, value, _ in measured:
+        if not 1 / MISREAD < value / designed[number] < MISREAD:
+            raise InputError(
+                f"--measured {number + 1}={value:g}: the design has a radius of "
+                f"{designed[number]:.2f} mm there: give the radius in mm, not the diameter, of "
+                "that ball"
+            )
+
+
 def _radii(
     machine: Machine, errors: Errors, is_cap: Bools, measured: Sequence[tuple[int, float, float]]
 ) -> tuple[Floats, Floats]:
@@ -181,7 +195,7 @@ def _radii(
 
 def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:
     """Radii "BALL=MM" or "BALL=MM:SIGMA" as number from 0, radius and standard deviation, mm."""
-    measured = []
+    measured: list[tuple[int, float, float]] = []
     for text in texts:
         found = PATTERN.fullmatch(text.replace(" ", ""))
         try:
@@ -196,6 +210,11 @@ def parse_measured(texts: tuple[str, ...], balls: int) -> Measured:
             raise InputError(
                 f"--measured {text}: allowed is ball 1 to {balls}, with a radius and its sigma "
                 "above 0 mm: change it"
+            )
+        if any(values[0] == number for number, _, _ in measured):
+            raise InputError(
+                f"--measured {text}: ball {ball} has a radius already: give one for each ball, of "
+                "several measurements their mean"
             )
         measured.append(values)
     return tuple(measured)

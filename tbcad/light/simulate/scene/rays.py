@@ -303,7 +303,9 @@ def camera_around_object(
             f"--elevation {np.degrees(elevation):g} is not on the hemisphere that the mirrors "
             "see: allowed is 0 to 90 degrees"
         )
-    if not capture_mm / 2 < distance < np.inf:
+    if not np.isfinite(distance):
+        raise InputError(f"--distance {distance:g} is no length: give mm")
+    if distance <= capture_mm / 2:
         raise InputError(
             f"--distance {distance:g} is inside the object's capture sphere: allowed is more than "
             f"{capture_mm / 2:g} mm"

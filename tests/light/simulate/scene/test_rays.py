@@ -15,7 +15,12 @@ from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.optics.power_diagram import PLANES
 from tbcad.core.optics.reflection import miss_distances
 from tbcad.errors import InputError
-from tbcad.light.simulate.scene.rays import TracedRays, exact_tracer, pixel_directions
+from tbcad.light.simulate.scene.rays import (
+    TracedRays,
+    camera_around_object,
+    exact_tracer,
+    pixel_directions,
+)
 from tbcad.light.simulate.scene.reflector import ExportedDesign, Reflector, read_export, reflectors
 from tbcad.light.simulate.scene.shell_meshes import mesh_tracer, read_shell_meshes
 from tbcad.tolerancing.montecarlo.draws import draw
@@ -256,3 +261,12 @@ def test_refused(
     (tmp_path / name).unlink()
     with pytest.raises(InputError, match=f"{name} is not there: name a folder that tbcad build"):
         read_export(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("distance", "says"),
+    [(np.inf, "inf is no length"), (np.nan, "nan is no length"), (30, "30 is inside the object's")],
+)
+def test_distances_of_no_camera_are_refused(distance: float, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        camera_around_object(0.0, 0.5, distance, 60.0)

@@ -306,6 +306,19 @@ def test_wrong_texts_are_refused(text: str) -> None:
         parse_measured((text,), 5)
 
 
+@pytest.mark.parametrize("ball", [0, CAP])
+@pytest.mark.parametrize("factor", [0.5, 2, 100])
+def test_a_diameter_or_a_shifted_point_is_no_radius(ball: int, factor: float) -> None:
+    value = factor * MACHINE.radius[ball]
+    with pytest.raises(InputError, match=r"the design has a radius of|not its sagitta"):
+        of_prototype(measured=((ball, value, 0.01),))
+
+
+def test_two_radii_of_one_ball_are_refused() -> None:
+    with pytest.raises(InputError, match="ball 1 has a radius already"):
+        parse_measured(("1=43.2", "2=34.61", "1=44"), 5)
+
+
 BUILDS = 8
 FIRST_SEED = 10  # of a machine: the lens of seed 5 nearly folds within its picture
 PRIOR = small_prior(small_machine(stops=3))
