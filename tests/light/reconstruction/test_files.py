@@ -267,7 +267,7 @@ def test_light_that_no_hull_explains(ball: Path) -> None:
     frame = source.frames["a"]
     alone = frame.planes["mirror"] == 20
     frame.planes["colour"][alone] = 200
-    facts = reconstruction(source, ReconstructOptions("", nodes=72, epochs=1)).facts
+    facts = reconstruction(source, ReconstructOptions("", nodes=48, epochs=1)).facts
     assert 0.0003 < facts["unexplained_light"] < 0.1
 
 

@@ -191,19 +191,22 @@ def edit(run: Path, name: str, **changes: object) -> None:
     edit_json(run / "photographs" / f"{name}.json", lambda record: record.update(changes))
 
 
-@pytest.mark.parametrize("phase", ["led_1", "dark"])
 def test_another_exposure_is_named_and_not_used(
-    copied: Path, small: Small, whole: Detection, phase: str
+    copied: Path, small: Small, whole: Detection
 ) -> None:
-    name = exposure_name(small.run.frames[5], phase)
-    edit(copied, name, exposure_s=0.5)
+    """Of a photograph by an LED, and of a dark one, whose frame loses nothing."""
+    names = exposure_name(small.run.frames[5], "led_1"), exposure_name(small.run.frames[3], "dark")
+    for name in names:
+        edit(copied, name, exposure_s=0.5)
     found = detected(copied, small)
-    says = f"{name} was exposed for 0.5 s and not for 1 s as most photographs by LEDs: it is not"
-    assert says in " ".join(found.faults)
-    absent = {why for (frame, _, led), why in found.rejected.items() if (frame, led) == (5, 0)}
-    assert (Rejection.NO_PHOTOGRAPH in absent) == (phase == "led_1")
-    if phase == "dark":
-        assert len(found.highlights) == pytest.approx(len(whole.highlights), abs=2)
+    says = "was exposed for 0.5 s and not for 1 s as most photographs by LEDs: it is not"
+    assert all(f"{name} {says}" in " ".join(found.faults) for name in names)
+    lost = {(frame, led) for (frame, _, led), why in found.rejected.items()
+            if why == Rejection.NO_PHOTOGRAPH}  # fmt: skip
+    assert lost == {(5, 0)}
+    frames = found.highlights.frame, whole.highlights.frame
+    there, before = ((one != 5).sum() for one in frames)
+    assert there == pytest.approx(before, abs=2)
 
 
 @pytest.mark.parametrize(
@@ -253,24 +256,30 @@ def test_light_larger_than_a_highlight() -> None:
     assert "most are full of light: darken the room" in error
 
 
-@pytest.mark.parametrize(
-    ("aside", "brightness", "reason"),
-    [(7.0, 200, Rejection.DOUBLE), (2.0, 200, Rejection.MERGED), (0.0, 255, Rejection.SATURATED)],
-)
-def test_spots_that_are_no_highlights(
-    copied: Path, small: Small, whole: Detection, aside: float, brightness: int, reason: Rejection
-) -> None:
-    h, k = whole.highlights, len(whole.highlights) // 2
-    frame, sphere, led = int(h.frame[k]), int(h.sphere[k]), int(h.led[k])
-    name = exposure_name(small.run.frames[frame], f"led_{led + 1}")
-    path = copied / "photographs" / f"{name}.png"
-    pixels = np.array(read_image(path))
-    x, y = np.rint(h.pixel[k] + np.array([aside, 0.0])).astype(int)
-    pixels[y : y + 2, x : x + 2] = brightness
-    Image.fromarray(pixels).save(path)
-    edit(copied, name, sha256=digest(path))
+def test_spots_that_are_no_highlights(copied: Path, small: Small, whole: Detection) -> None:
+    """Light beside three highlights, or on one, each in a photograph of its own."""
+    h, wanted = whole.highlights, {}
+    for k, (aside, brightness, reason) in zip(
+        np.linspace(0, len(h) - 1, 3).astype(int).tolist(),
+        (
+            (7.0, 200, Rejection.DOUBLE),
+            (2.0, 200, Rejection.MERGED),
+            (0.0, 255, Rejection.SATURATED),
+        ),
+        strict=True,
+    ):
+        frame, sphere, led = int(h.frame[k]), int(h.sphere[k]), int(h.led[k])
+        name = exposure_name(small.run.frames[frame], f"led_{led + 1}")
+        path = copied / "photographs" / f"{name}.png"
+        pixels = np.array(read_image(path))
+        x, y = np.rint(h.pixel[k] + np.array([aside, 0.0])).astype(int)
+        pixels[y : y + 2, x : x + 2] = brightness
+        Image.fromarray(pixels).save(path)
+        edit(copied, name, sha256=digest(path))
+        wanted[frame, sphere, led] = reason
     found = detected(copied, small)
-    assert found.rejected[frame, sphere, led] == reason
+    assert {one: found.rejected.get(one) for one in wanted} == wanted
+    assert len({frame for frame, *_ in wanted}) == 3
 
 
 def test_a_hidden_highlight_is_not_taken_for_another(
