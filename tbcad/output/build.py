@@ -22,7 +22,7 @@ from tbcad.prototype.files.write import export_prototype
 from tbcad.prototype.purchased.parts import load_parts
 from tbcad.records.design import ShellLamps
 from tbcad.shell.files import mandrel_record, write_mandrels, write_shell_meshes, write_shell_solids
-from tbcad.shell.halves import design_mandrel, shell_envelope
+from tbcad.shell.halves import check_mirrors, design_mandrel, shell_envelope
 from tbcad.shell_lamps.files import printed_ring, ring_record, write_ring
 from tbcad.shell_lamps.ring import lamp_ring
 from tbcad.types import Progress
@@ -65,6 +65,7 @@ def write_export(
     lamps, own = None, without_sections(design.spec, "prototype", "printer")
     shells = replace(design, spec=own)  # which do not follow from the rest
     if SHELL in parts:
+        check_mirrors(design)
         envelope = shell_envelope(design)  # refuses flanges that do not fit
         lamps = _lamps(design, folder, submit_file)
         submit_file(write_shell_meshes, shells, envelope, folder)

@@ -18,7 +18,7 @@ from tbcad.prototype.arrangement import PrototypeModel, arrange
 from tbcad.prototype.drive.balance import ball_masses, cap_volume
 from tbcad.prototype.files.bom import PRINT_MATERIAL, ball_rows, by_currency
 from tbcad.prototype.purchased.parts import load_prices
-from tbcad.shell.halves import camera_a_mesh, design_mandrel
+from tbcad.shell.halves import camera_a_mesh, check_mirrors, design_mandrel
 from tbcad.types import Progress
 
 # Hours of printing for a cubic centimetre of solid volume, and filament, supports included, as a
@@ -110,6 +110,7 @@ def overview(
 def _shells(design: MirrorDesign) -> PrintEstimate:
     if design.spec.shell.negative:
         design_mandrel(design)  # refuses holes that do not fit
+    check_mirrors(design)
     spec = design.spec.model_copy(update={"mesh": COARSE})
     mesh = camera_a_mesh(MirrorDesign(spec, design.arrays))
     a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)

@@ -7,7 +7,7 @@ strip makes what a mirror covers on its facets nearly what it covers on its sphe
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linprog
@@ -33,6 +33,7 @@ ROUNDS = 3  # the search is in a plane, so what it finds on a sphere is looked f
 # 0.02 where slivers stand up and fold.
 MIN_ALONG_SPHERE = 0.5
 MARGINS_PER_MM = 10  # steps of a margin that an error names
+NEWTON = 5  # steps from a corner or edge to where coats meet
 
 
 def means(points: Floats, cell: Ints) -> Floats:
@@ -90,37 +91,72 @@ class Facets:
     outlines: CellOutlines  # of the cells
 
 
-def mirror_facets(spec: Spec, cells: Cells, distance: Floats) -> Facets:
-    """Facets of camera a's cells within the tolerances; distances (m,) to the object, mm."""
+def mirror_facets(spec: Spec, cells: Cells, distance: Floats, *, outermost: bool = False) -> Facets:
+    """Facets of camera a's cells within the tolerances; distances (m,) to the object, mm.
+
+    `outermost`: those along the outlines alone, and one fan within them, in a tenth of the time.
+    """
     outlines = cell_outlines(cells, segment_counts(spec, cells, distance))
     if np.all(cells.surfaces.curvature == 0):
         return _planar(outlines)
-    return _spherical(spec, cells, outlines, distance)
+    return _spherical(spec, cells, outlines, distance, outermost)
+
+
+def check_facets(spec: Spec, cells: Cells, distance: Floats) -> None:
+    """SpecError where facets would fold, or show too little; arguments as of `mirror_facets`.
+
+    Both are worst along the outlines, so nothing else is asked.
+    """
+    facets = mirror_facets(spec, cells, distance, outermost=True)
+    if np.any(cells.surfaces.curvature > 0):
+        strips = slice(2 * len(facets.outlines.cell))  # the fans' facets are in no file
+        along = replace(facets, triangles=facets.triangles[strips], mirror=facets.mirror[strips])
+        check_folds(along, cells.mirror_surfaces)
+    check_coverage(spec, cells, facets)
 
 
 def facet_coverage(spec: Spec, cells: Cells, facets: Facets) -> float:
     """Coverage diameter that facets show, mm, as 32-bit floats hold them.
 
-    They cost most along the outline: of the facets there rays off both ends count.
+    They cost most along the outline: of the facets there rays off both ends count, where a coat
+    brings these.
     """
     outlines, pinhole = facets.outlines, np.array(spec.optics.camera_mm)
     _, sides = cells.rings
     arc = sides[rows_and_columns(outlines.segments[sides // 2])[0]] // 2
-    cut = (cells.arcs.faces[arc] == cells.seam).any(axis=1) & cells.halved[outlines.cell]
+    beyond = cells.arcs.faces[arc].sum(axis=1) - outlines.cell
+    cut = (beyond == cells.seam) & cells.halved[outlines.cell]
     written = facets.vertices.astype(np.float32).astype(np.float64)
     beside = written[facets.triangles[: len(arc)]][~cut]
     a, b, c = beside.swapaxes(0, 1)
     normal = unit(np.cross(b - a, c - a))
     ends = written[np.stack([outlines.vertex, outlines.vertex[outlines.following]])][:, ~cut]
+    if coat := spec.mirrors.coating_um / 1000:
+        ends = _onto_coats(cells, coat, (outlines.cell[~cut], beyond[~cut]), ends)
     return 2 * float(miss_distances(pinhole, ends, normal).min())
 
 
-def check_coverage(spec: Spec, cells: Cells, facets: Facets) -> None:
-    """SpecError where facets of mirrors by rule traced show less than the capture sphere.
+def _onto_coats(cells: Cells, coat: float, faces: tuple[Ints, Ints], points: Floats) -> Floats:
+    """Ends (2, b, 3) of facets moved by a coat (mm) to where it meets the face beyond.
 
-    Facets under a coat are not what reflects, and are left to the verification.
+    Of the faces only mirrors have a coat.
     """
-    if spec.mirrors.radius_rule != "traced" or spec.mirrors.coating_um:
+    own, beyond = faces
+    bare = cells.surfaces.subset(slice(cells.mirrors, None))
+    coated = cells.mirror_surfaces.offset(coat).joined(bare)
+    for _ in range(NEWTON):
+        f, g = coated.value(own, points), coated.value(beyond, points)
+        up, across = coated.gradient(own, points), coated.gradient(beyond, points)
+        along = dot(up, across)
+        # The shortest step onto both surfaces is in the plane of their normals.
+        a, b = np.stack([f - along * g, g - along * f])[..., None] / (1 - along**2)[..., None]
+        points = points - a * up - b * across
+    return points
+
+
+def check_coverage(spec: Spec, cells: Cells, facets: Facets) -> None:
+    """SpecError where facets of mirrors by rule traced show less than the capture sphere."""
+    if spec.mirrors.radius_rule != "traced":
         return
     wanted, margin = spec.optics.capture_diameter_mm, spec.mirrors.margin_mm
     shown = facet_coverage(spec, cells, facets)
@@ -141,7 +177,9 @@ def _planar(outlines: CellOutlines) -> Facets:
     return Facets(np.concatenate([outlines.vertices, middle]), fans, outlines.cell, outlines)
 
 
-def _spherical(spec: Spec, cells: Cells, outlines: CellOutlines, distance: Floats) -> Facets:
+def _spherical(
+    spec: Spec, cells: Cells, outlines: CellOutlines, distance: Floats, outermost: bool
+) -> Facets:
     """A strip along each outline, then rings of quads, then a fan about the middle."""
     mirrors, cell, edge = cells.mirror_surfaces, outlines.cell, outlines.points
     middle = middles(outlines, mirrors)
@@ -151,6 +189,7 @@ def _spherical(spec: Spec, cells: Cells, outlines: CellOutlines, distance: Float
     width = strip_widths(spec.mesh.ray_error_mm, mirrors.radius, distance, middle)
     strip = mirrors.projected(cell, strip_points(outlines, middle, outside, width))
     rings = np.ceil(farthest / np.sqrt(4 * spec.mesh.chord_error_mm * mirrors.radius))
+    rings = np.minimum(rings, 1) if outermost else rings
     return _ringed(outlines, mirrors, middle, strip, rings.astype(np.int64))
 
 

@@ -41,11 +41,8 @@ NamedFaces: TypeAlias = list[tuple[str, TopoDS_Face]]
 
 @kept("shells")
 def write_shell_meshes(design: MirrorDesign, envelope: Envelope, folder: Path) -> None:
-    """Write both shells as STL and 3MF into a folder; the envelope closes camera a's half.
-
-    SpecError where facets do not cover the capture sphere.
-    """
-    mesh = camera_a_mesh(design, envelope, covers=True)
+    """Write both shells as STL and 3MF into a folder; the envelope closes camera a's half."""
+    mesh = camera_a_mesh(design, envelope)
     for array in design.arrays:
         write_half_mesh(folder, part_files("shell", array), mesh, array)
 

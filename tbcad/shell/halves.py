@@ -5,6 +5,7 @@ import numpy as np
 from tbcad.cad.kernel.mesh import Mesh
 from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.shell.envelope import Envelope, Holes, boundary_chain, closing_envelope
+from tbcad.shell.facets import check_facets
 from tbcad.shell.mandrel import Mandrel, mandrel_of
 from tbcad.shell.mesh import FROM_X, FROM_Z, MeshBuilder, front_facets, shell_mesh
 from tbcad.types import Floats, Ints
@@ -24,16 +25,17 @@ def design_mandrel(design: MirrorDesign) -> Mandrel:
     return mandrel_of(design.spec.shell, array.modelled_cells, array.ellipsoid)
 
 
-def camera_a_mesh(
-    design: MirrorDesign, envelope: Envelope | None = None, covers: bool = False
-) -> Mesh:
-    """Mesh of camera a's half; the envelope is worked out (or SpecError) where it is not given.
+def check_mirrors(design: MirrorDesign) -> None:
+    """SpecError where the mirrors' facets would fold, or show less than the capture sphere."""
+    array = design.arrays[0]
+    check_facets(design.spec, array.modelled_cells, array.apex_distance)
 
-    SpecError where its facets must cover the capture sphere and do not, or fold.
-    """
+
+def camera_a_mesh(design: MirrorDesign, envelope: Envelope | None = None) -> Mesh:
+    """Mesh of camera a's half; the envelope is worked out (or SpecError) where it is not given."""
     array = design.arrays[0]
     envelope = envelope or shell_envelope(design)
-    return shell_mesh(design.spec, array.modelled_cells, envelope, array.apex_distance, covers)
+    return shell_mesh(design.spec, array.modelled_cells, envelope, array.apex_distance)
 
 
 def camera_a_mandrel_mesh(design: MirrorDesign, mandrel: Mandrel | None = None) -> Mesh:

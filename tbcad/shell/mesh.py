@@ -12,7 +12,7 @@ from tbcad.core.optics.pedestals.cells import PedestalCells
 from tbcad.core.spec.design import Spec
 from tbcad.shell.cell_outlines import CellOutlines, rows_and_columns
 from tbcad.shell.envelope import ARC_ENDS, Envelope, Holes, boundary_chain, casing_lines, outline
-from tbcad.shell.facets import Facets, check_coverage, check_folds, mirror_facets
+from tbcad.shell.facets import Facets, mirror_facets
 from tbcad.types import Floats, Ints
 
 MIN_HOLE_SEGMENTS = 24
@@ -41,26 +41,16 @@ def wall_facets(cells: PedestalCells, outlines: CellOutlines) -> Ints:
     return np.concatenate([fans, np.column_stack([middle, far, near])])
 
 
-def shell_mesh(
-    spec: Spec, cells: Cells, envelope: Envelope, distance: Floats, covers: bool = False
-) -> Mesh:
-    """Mesh of camera a's half within tolerances; distances of mirrors to the object (m,), mm.
-
-    SpecError where its facets must cover the capture sphere and do not, or fold.
-    """
-    builder, outlines = front_facets(spec, cells, distance, covers)
+def shell_mesh(spec: Spec, cells: Cells, envelope: Envelope, distance: Floats) -> Mesh:
+    """Mesh of camera a's half within tolerances; distances of mirrors to the object (m,), mm."""
+    builder, outlines = front_facets(spec, cells, distance)
     _add_casing(builder, cells, outlines, envelope)
     return builder.mesh()
 
 
-def front_facets(
-    spec: Spec, cells: Cells, distance: Floats, covers: bool = False
-) -> tuple["MeshBuilder", CellOutlines]:
+def front_facets(spec: Spec, cells: Cells, distance: Floats) -> tuple["MeshBuilder", CellOutlines]:
     """A builder with the facets of mirrors and walls of pedestals, and the mirrors' outlines."""
     front = mirror_facets(spec, cells, distance)
-    if covers:
-        check_folds(front, cells.mirror_surfaces)
-        check_coverage(spec, cells, front)
     builder = MeshBuilder(front, spec.mesh.structure_error_mm)
     if isinstance(cells, PedestalCells):
         builder.triangles.append(wall_facets(cells, front.outlines))

@@ -6,15 +6,10 @@ from tbcad.core.mirrors.array import MirrorDesign
 from tbcad.core.optics.reflection import miss_distances
 from tbcad.core.optics.surfaces import Surfaces
 from tbcad.core.spec.errors import SpecError
+from tbcad.output.overview import overview
 from tbcad.shell.cell_outlines import CellOutlines
-from tbcad.shell.facets import (
-    Facets,
-    check_coverage,
-    facet_coverage,
-    middles,
-    mirror_facets,
-)
-from tbcad.shell.halves import camera_a_mesh, shell_envelope
+from tbcad.shell.facets import Facets, facet_coverage, middles, mirror_facets
+from tbcad.shell.halves import camera_a_mesh, check_mirrors, shell_envelope
 from tests.mirror_arrays import mirror_design
 
 INWARD_FOOT = (
@@ -141,25 +136,36 @@ FOLDED = ["n=3", "camera_mm=[185.4, 0, -136.3]", "semi_minor_mm=51.4", "capture_
 
 def test_facets_that_would_fold_are_refused() -> None:
     with pytest.raises(SpecError, match=r"a0026 .* facets would fold: one .* is 0\.00\d+ mm wide"):
-        camera_a_mesh(mirror_design(*FOLDED), covers=True)
+        check_mirrors(mirror_design(*FOLDED))
 
 
 # As the verification found them on the files of these designs: by outlines on recovered spheres.
 @pytest.mark.parametrize(
-    ("margin", "ray_error", "shown"),
-    [(0.0, 0.05, 59.8285148), (0.1, 0.05, 59.9313265), (0.6, 1.0, 59.0979393)],
+    ("options", "shown"),
+    [
+        (["n=3", "margin_mm=0"], 59.8285148),
+        (["n=3", "margin_mm=0.1"], 59.9313265),
+        (["n=3", "ray_error_mm=1"], 59.0979393),
+        (["n=5", "margin_mm=0.2", "ray_error_mm=0.1", "coating_um=100"], 59.6443208),
+    ],
 )
-def test_what_facets_show_is_what_the_verification_finds(
-    margin: float, ray_error: float, shown: float
-) -> None:
-    mirrors = mirror_design("n=3", f"margin_mm={margin}", f"ray_error_mm={ray_error}")
+def test_what_facets_show_is_what_the_verification_finds(options: list[str], shown: float) -> None:
+    mirrors = mirror_design(*options)
     facets, cells = facets_of(mirrors), mirrors.arrays[0].modelled_cells
     assert facet_coverage(mirrors.spec, cells, facets) == pytest.approx(shown, abs=1e-5)
-    with pytest.raises(SpecError, match=rf"show {shown:.2f} mm, less than .* 60: make mirrors"):
-        check_coverage(mirrors.spec, cells, facets)
+    for refuse in (check_mirrors, overview):  # as a build, and as build --dry-run
+        with pytest.raises(SpecError, match=rf"show {shown:.2f} mm, less than .* 60: make mirrors"):
+            refuse(mirrors)
+
+
+def test_a_coat_leaves_the_mirrors_that_the_seam_halves() -> None:
+    bare, coated = mirror_design("n=4"), mirror_design("n=4", "coating_um=200")
+    halved = bare.arrays[0].modelled_cells.halved
+    assert halved.sum() == 9
+    for array in coated.arrays:
+        assert (array.modelled_cells.halved == halved).all()
 
 
 def test_margins_that_an_error_names_are_enough() -> None:
     for options in (["n=3", "margin_mm=0.2"], ["n=3"]):
-        mirrors = mirror_design(*options)
-        check_coverage(mirrors.spec, mirrors.arrays[0].modelled_cells, facets_of(mirrors))
+        check_mirrors(mirror_design(*options))

@@ -333,14 +333,14 @@ def _cells_under_coat(cells: Cells, coating: float) -> Cells:
         )
     if isinstance(cells, PedestalCells):
         try:
-            return cells.with_mirrors(mirrors.offset(-coating))
+            return replace(cells.with_mirrors(mirrors.offset(-coating)), coat=coating)
         except NotRegularError:
             raise SpecError(
                 f"mirrors.coating_um {coating * 1000:g} is more than the grooves between pedestals "
                 "are deep: make the coat thinner or shell.groove_mm larger"
             ) from None
     modelled = mirrors.offset(-coating).joined(cells.surfaces.subset(slice(cells.mirrors, None)))
-    return cells_of(modelled, cells.triangles)
+    return replace(cells_of(modelled, cells.triangles), coat=coating)
 
 
 def _check_clearance(spec: Spec, array: MirrorArray) -> None:

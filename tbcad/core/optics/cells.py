@@ -1,6 +1,6 @@
 """Cells: the part of each mirror's sphere that no other covers, bounded by circular arcs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,7 @@ from tbcad.types import Bools, Floats, Ints
 # Corners nearer to each other than this are one: far below any tolerance of manufacture, far above
 # rounding.
 MERGED_MM = 1e-4
+ON_SEAM_MM = 1e-9  # of an apex from the seam, after a coat was taken off and put on again
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 PARAMETER, STEP = (NODES + 1) / 2, WEIGHTS / 2  # from 0 to 1
 
@@ -30,6 +31,7 @@ class Cells:
     surfaces: Surfaces  # the m mirrors and the two planes
     triangles: Ints  # the three faces at each corner, counter-clockwise from outside, (t, 3)
     corners: Floats  # points, mm, (t, 3)
+    coat: float = field(default=0.0, kw_only=True)  # mm, that the mirrors get; walls get none
 
     def __repr__(self) -> str:
         return f"<Cells: {self.mirrors} mirrors, {len(self.corners)} corners>"
@@ -56,15 +58,17 @@ class Cells:
 
     @property
     def halved(self) -> Bools:
-        """Which mirrors (m,) the seam halves: those whose apices lie on it.
+        """Which mirrors (m,) the seam halves: those whose apices, on the coat, lie on it.
 
         Their other halves belong to the other camera and share their virtual cameras.
         """
-        return np.asarray(self.surfaces.apex[: self.mirrors, 0] == 0)
+        reflecting = self.mirror_surfaces.offset(self.coat)
+        return np.asarray(np.abs(reflecting.apex[:, 0]) < ON_SEAM_MM)
 
     def mirrored(self) -> "Cells":
         """The other camera's cells: mirror image in the plane x = 0."""
-        return Cells(self.surfaces.mirrored(), self.triangles[:, ::-1], self.corners * FLIP_X)
+        turned = self.triangles[:, ::-1]
+        return Cells(self.surfaces.mirrored(), turned, self.corners * FLIP_X, coat=self.coat)
 
     @cached_property
     def arcs(self) -> "Arcs":

@@ -5,7 +5,7 @@ with straight edges reach down to the bottoms of the grooves, which are straight
 `borders`). All of it has a closed form.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -55,7 +55,7 @@ class PedestalCells(Cells):
         layout = self.layout
         plan = planned(layout.flat.mirrored(), layout.pinhole * FLIP_X, layout.groove)
         other = pedestal_cells(plan, layout.mirrors.mirrored())
-        return other.with_mirrors(self.mirror_surfaces.mirrored())
+        return replace(other.with_mirrors(self.mirror_surfaces.mirrored()), coat=self.coat)
 
     def with_mirrors(self, mirrors: Surfaces) -> "PedestalCells":
         """Other mirrors (m of them) on the same pedestals: borders and grooves stay.
