@@ -26,7 +26,7 @@ from tbcad_verify.record.export import read_export
 from tbcad_verify.record.files import read
 from tbcad_verify.record.prototype import RECORD, SagTable
 from tbcad_verify.report.checks import check_names
-from tbcad_verify.run.kept import Store, keeping
+from tbcad_verify.run.kept import Shared, Store, keeping
 from tbcad_verify.run.processes import Processes
 from tbcad_verify.step.step_file import StepFile, examine_all, load, read_step_files
 from tbcad_verify.types import Floats
@@ -344,7 +344,7 @@ def test_sweeps_past_the_same_solids_are_kept(measured: MeasuredPrototype, tmp_p
             swing.axial_solid(measured, "body", solid.translate([0, shift, 0]))
             for solid, shift in ((arm, 80.0), (rod, shift))
         )
-        return swing.sweeps_past(two, [one], ends)
+        return swing.sweeps_past(two, Shared([one]), ends)
 
     expected = swept(84.0)
     for settings, again in (((84.0,), False), ((84.0,), True), ((84.1,), False)):

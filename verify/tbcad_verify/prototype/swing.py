@@ -15,7 +15,7 @@ from tbcad_verify.prototype.bodies import MeasuredPrototype, turning
 from tbcad_verify.prototype.context import PrototypeContext
 from tbcad_verify.prototype.measured_parts import PLACED
 from tbcad_verify.report.checks import Check, CheckName, at_most, informative, short_list
-from tbcad_verify.run.kept import kept
+from tbcad_verify.run.kept import Shared, kept
 from tbcad_verify.types import Floats
 
 SEARCH_MM = 8.0  # larger clearances are all reported as this
@@ -127,7 +127,8 @@ def checks(
     moving = [axial_solid(measured, *one) for one in swung]
     room, ends = room_of(moving, context.frame), swing_ends(measured)
     still = [axial_solid(measured, name, solid ^ room) for name, solid in fixed]
-    past = [sweeps_past(one, moving, ends) for one in still]
+    shared = Shared(moving)
+    past = [sweeps_past(one, shared, ends) for one in still]
     sweeps = [one for of_moving in zip(*past, strict=True) for one in of_moving]
     volume = max((one.volume for one in sweeps), default=0.0)
     nearest = min(sweeps, key=lambda one: one.gap, default=None)
@@ -191,11 +192,9 @@ def swing_ends(measured: MeasuredPrototype) -> tuple[float, float]:
 
 
 @kept("checks of the swing")
-def sweeps_past(
-    still: AxialSolid, moving: Sequence[AxialSolid], ends: tuple[float, float]
-) -> list[PairSweep]:
-    """The sweeps of all rotating solids past one that is fixed."""
-    return [sweep(ends, one, still) for one in moving]
+def sweeps_past(still: AxialSolid, moving: Shared, ends: tuple[float, float]) -> list[PairSweep]:
+    """The sweeps of all rotating solids (`AxialSolid`) past one that is fixed."""
+    return [sweep(ends, one, still) for one in moving.value]
 
 
 def sweep(ends: tuple[float, float], moving: AxialSolid, still: AxialSolid) -> PairSweep:

@@ -203,6 +203,18 @@ def _worked_out(
         return result, heard, files
 
 
+@dataclass(frozen=True)
+class Shared:
+    """A value that many calls get: it is digested once."""
+
+    value: Any
+
+    @cached_property
+    def digest(self) -> str:
+        """Of the value."""
+        return digest(self.value)
+
+
 def _is_folder(argument: object) -> bool:
     return isinstance(argument, Path) and argument.is_dir()
 
@@ -234,8 +246,11 @@ class _Canonical(pickle.Pickler):
         kind = type(value)
         if kind in (set, frozenset):
             return kind.__name__, sorted(map(digest, value))
-        if isinstance(value, Path):
-            return kind.__name__, hashlib.sha256(value.read_bytes()).hexdigest()
+        if kind is Shared or isinstance(value, Path):
+            known = (
+                value.digest if kind is Shared else hashlib.sha256(value.read_bytes()).hexdigest()
+            )
+            return kind.__name__, known
         if kind.__module__ == "trimesh.base":
             from numpy import array  # here: processes that need none begin without
 
