@@ -338,11 +338,13 @@ def random_body(rng: np.random.Generator) -> Any:
 def test_sweeps_past_the_same_solids_are_kept(measured: MeasuredPrototype, tmp_path: Path) -> None:
     import manifold3d
 
-    def swept(shift: float, ends: tuple[float, float] = (0.0, 1.0)) -> list[swing.PairSweep]:
+    def swept(
+        shift: float, ends: tuple[float, float] = (0.0, 1.0), moving: float = 80.0
+    ) -> list[swing.PairSweep]:
         arm, rod = (manifold3d.Manifold.cube([size, 2.0, 2.0]) for size in (90.0, 3.0))
         one, two = (
             swing.axial_solid(measured, "body", solid.translate([0, shift, 0]))
-            for solid, shift in ((arm, 80.0), (rod, shift))
+            for solid, shift in ((arm, moving), (rod, shift))
         )
         return swing.sweeps_past(two, Shared([one]), ends)
 
@@ -353,6 +355,7 @@ def test_sweeps_past_the_same_solids_are_kept(measured: MeasuredPrototype, tmp_p
         assert bool(store.reused) == again
     with keeping(store := Store(tmp_path, "code")):
         swept(84.0, (0.0, 1.1))
+        swept(84.0, moving=80.1)
     assert not store.reused
 
 
